@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace weft {
+
+// The largest stable step of a scene, and the one taken. Lengths in s.
+struct StepPlan {
+  std::int64_t substeps = 1;      // a frame
+  double substep = 0;             // frame step / substeps
+  double linear_bound = 0;        // for every shape; 0: none
+  double estimated_bound = 0;     // for the present shape
+  double damping_ratio = 0;       // of the stiffest mode
+  std::string limiting_sheet;
+};
+
+struct SkippedPass {
+  std::string pass;
+  std::string reason;
+};
+
+struct Warning {
+  std::string code;
+  std::string field;    // path in a scene file; empty: the whole scene
+  std::string message;
+};
+
+// What a scene needs: derived once, before the run.
+struct Plan {
+  StepPlan step;
+  std::vector<std::string> passes;
+  std::vector<SkippedPass> skipped;
+  std::vector<Warning> warnings;
+};
+
+// Substeps of a frame that are ever run.
+inline constexpr std::int64_t kMaxSubsteps = 1'000'000;
+
+}  // namespace weft

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/model/scene.h"
+#include "core/plan.h"
+
+namespace weft {
+
+struct FrameStats {
+  double kinetic_energy = 0;      // J
+  double potential_energy = 0;    // elastic + gravity, 0 at the origin, J
+  double largest_strain = 0;      // of the stretch connections
+};
+
+// Why a plan cannot be run.
+struct StepRefusal {
+  double asked = 0;               // s
+  double bound = 0;               // s
+  bool too_many_substeps = false; // else: asked lies above the linear bound
+};
+
+// A scene in motion. Not thread-safe; equal scenes and calls give equal bits.
+class Simulation {
+ public:
+  // Precondition: find_problems(scene) is empty.
+  explicit Simulation(Scene scene);
+  ~Simulation();
+  Simulation(Simulation&&) noexcept;
+  Simulation& operator=(Simulation&&) noexcept;
+
+  const Scene& scene() const;
+  const Plan& plan() const;
+  // Set when the planned or asked step must not be run; advance_frame() is then not called.
+  std::optional<StepRefusal> refusal() const;
+
+  // Advances by one frame step. Returns false, and leaves the frame unfinished for good, when a
+  // position stopped being finite.
+  [[nodiscard]] bool advance_frame();
+
+  std::int64_t frame() const;
+  double time() const;            // s
+  bool at_rest() const;           // for 30 frames, see Session.at_rest in the interface
+  int particle_count() const;     // of all sheets
+
+  // Planes x, y, z of all sheets in scene order; out has 3 x particle_count values.
+  void copy_positions(std::span<double> out) const;   // m
+  void copy_velocities(std::span<double> out) const;  // m/s
+  FrameStats stats() const;
+
+  // Changes a textile between frames: positions and velocities stay, the step is planned anew.
+  // Changes nothing and returns the refusal when that step must not be run.
+  // Precondition: find_problems(textile, "") is empty; sheet < scene().sheets.size().
+  std::optional<StepRefusal> set_textile(std::size_t sheet, const Textile& textile);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace weft

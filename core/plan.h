@@ -1,19 +1,20 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
+
+#include "core/model/mesh.h"
 
 namespace weft {
 
 // The largest stable step of a scene, and the one taken. Lengths in s.
 struct StepPlan {
-  std::int64_t substeps = 1;      // a frame
-  double substep = 0;             // frame step / substeps
-  double linear_bound = 0;        // for every shape; 0: none
-  double estimated_bound = 0;     // for the present shape
-  double damping_ratio = 0;       // of the stiffest mode
+  std::int64_t substeps = 1;   // a frame
+  double substep = 0;          // frame step / substeps
+  double linear_bound = 0;     // for every shape; 0: none
+  double estimated_bound = 0;  // for the present shape
+  double damping_ratio = 0;    // of the stiffest mode
   std::string limiting_sheet;
 };
 
@@ -24,7 +25,7 @@ struct SkippedPass {
 
 struct Warning {
   std::string code;
-  std::string field;    // path in a scene file; empty: the whole scene
+  std::string field;  // path in a scene file; empty: the whole scene
   std::string message;
 };
 
@@ -36,7 +37,17 @@ struct Plan {
   std::vector<Warning> warnings;
 };
 
-// Substeps of a frame that are ever run.
+// Most substeps of a frame that are ever run.
 inline constexpr std::int64_t kMaxSubsteps = 1'000'000;
+
+// A sheet's present shape, as a plan sees it.
+struct SheetShape {
+  const Mesh& mesh;
+  const VectorXd& inverse_mass;  // (particles) 1/kg, 0: held
+  const Matrix3Xd& x;            // (3 x particles) m
+};
+
+// shapes: those of scene.sheets, in order.
+Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes);
 
 }  // namespace weft

@@ -12,16 +12,16 @@
 namespace weft {
 
 struct FrameStats {
-  double kinetic_energy = 0;      // J
-  double potential_energy = 0;    // elastic + gravity, 0 at the origin, J
-  double largest_strain = 0;      // of the stretch connections
+  double kinetic_energy = 0;    // J
+  double potential_energy = 0;  // elastic + gravity, 0 at the origin, J
+  double largest_strain = 0;    // of the stretch connections
 };
 
 // Why a plan cannot be run.
 struct StepRefusal {
-  double asked = 0;               // s
-  double bound = 0;               // s
-  bool too_many_substeps = false; // else: asked lies above the linear bound
+  double asked = 0;                // s
+  double bound = 0;                // s
+  bool too_many_substeps = false;  // else: asked lies above the linear bound
 };
 
 // A scene in motion. Not thread-safe; equal scenes and calls give equal bits.
@@ -43,9 +43,9 @@ class Simulation {
   [[nodiscard]] bool advance_frame();
 
   std::int64_t frame() const;
-  double time() const;            // s
-  bool at_rest() const;           // for 30 frames, see Session.at_rest in the interface
-  int particle_count() const;     // of all sheets
+  double time() const;         // s
+  bool at_rest() const;        // for 30 frames, see Session.at_rest in the interface
+  int particle_count() const;  // of all sheets
 
   // Planes x, y, z of all sheets in scene order; out has 3 x particle_count values.
   void copy_positions(std::span<double> out) const;   // m

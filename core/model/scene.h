@@ -15,8 +15,8 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 struct Keyframe {
-  double time = 0;                                      // s
-  Vector3d offset = Vector3d::Zero();                   // from the start, m
+  double time = 0;                     // s
+  Vector3d offset = Vector3d::Zero();  // from the start, m
 };
 
 // Offsets over time, linear between keyframes, constant outside; empty: no motion.
@@ -27,16 +27,16 @@ Vector3d offset_at(const Path& path, double time);
 struct Grid {
   int rows = 2;
   int columns = 2;
-  double spacing = 0;                                   // h, m
+  double spacing = 0;  // h, m
 };
 
 enum class Evaluator { kSeries, kExact, kLinearized, kPolynomial };
 
 struct ChoiKo {
   Evaluator evaluator = Evaluator::kLinearized;
-  int segments = 32;                                    // of kLinearized
-  int degree = 8;                                       // of kPolynomial
-  bool fold_clamp = false;                              // kLinearized samples eq. 5
+  int segments = 32;        // of kLinearized
+  int degree = 8;           // of kPolynomial
+  bool fold_clamp = false;  // kLinearized samples eq. 5
   bool diagonal_bend = true;
 };
 
@@ -54,33 +54,33 @@ struct SheetDefinition {
   Grid grid;
   Textile textile;
   BendingLaw bending;
-  Vector3d origin = Vector3d::Zero();                   // of particle 0, m
-  Quaterniond rotation = Quaterniond::Identity();       // about particle 0
-  std::vector<double> start_positions;                  // (3 x particles) x, y, z of each, m; or empty
-  std::vector<double> start_velocities;                 // (3 x particles), m/s; or empty
+  Vector3d origin = Vector3d::Zero();              // of particle 0, m
+  Quaterniond rotation = Quaterniond::Identity();  // about particle 0
+  std::vector<double> start_positions;             // (3 x particles) x, y, z of each, m; or empty
+  std::vector<double> start_velocities;            // (3 x particles), m/s; or empty
   std::vector<Pin> pins;
-  std::optional<double> skin;                           // m; absent: spacing / 10
+  std::optional<double> skin;  // m; absent: spacing / 10
 
   int particle_count() const { return grid.rows * grid.columns; }
 };
 
 struct Plane {
-  Vector3d point = Vector3d::Zero();                    // m
-  Vector3d normal = Vector3d::UnitY();                  // out of the body
+  Vector3d point = Vector3d::Zero();    // m
+  Vector3d normal = Vector3d::UnitY();  // out of the body
 };
 struct Sphere {
-  Vector3d center = Vector3d::Zero();                   // m
-  double radius = 0;                                    // m
+  Vector3d center = Vector3d::Zero();  // m
+  double radius = 0;                   // m
 };
 struct Box {
-  Vector3d center = Vector3d::Zero();                   // m
-  Vector3d half_size = Vector3d::Zero();                // m
+  Vector3d center = Vector3d::Zero();     // m
+  Vector3d half_size = Vector3d::Zero();  // m
   Quaterniond rotation = Quaterniond::Identity();
 };
 struct Capsule {
-  Vector3d start = Vector3d::Zero();                    // m
-  Vector3d end = Vector3d::Zero();                      // m
-  double radius = 0;                                    // m
+  Vector3d start = Vector3d::Zero();  // m
+  Vector3d end = Vector3d::Zero();    // m
+  double radius = 0;                  // m
 };
 
 struct Collider {
@@ -91,15 +91,15 @@ struct Collider {
 };
 
 struct Wind {
-  Vector3d velocity = Vector3d::Zero();                 // m/s
-  double gust = 0;                                      // velocity (1 + gust sin(2 pi t / period))
-  double gust_period = 1;                               // s
-  double air_density = 1.2;                             // kg/m^3
-  double tangential_drag = 0;                           // c_t, kg/(m^2 s)
+  Vector3d velocity = Vector3d::Zero();  // m/s
+  double gust = 0;                       // velocity (1 + gust sin(2 pi t / period))
+  double gust_period = 1;                // s
+  double air_density = 1.2;              // kg/m^3
+  double tangential_drag = 0;            // c_t, kg/(m^2 s)
 };
 
 struct Environment {
-  Vector3d gravity{0, -9.80665, 0};                     // m/s^2
+  Vector3d gravity{0, -9.80665, 0};  // m/s^2
   std::optional<Wind> wind;
 };
 
@@ -107,10 +107,10 @@ enum class IntegratorKind { kVerlet, kEuler, kMidpoint, kRk4 };
 
 struct SolverSettings {
   IntegratorKind integrator = IntegratorKind::kVerlet;
-  double frame_step = 1.0 / 60;                         // s
-  std::optional<double> substep;                        // asked for, s
+  double frame_step = 1.0 / 60;   // s
+  std::optional<double> substep;  // asked for, s
   bool allow_unstable = false;
-  double safety = 0.9;                                  // planned substep / linear bound
+  double safety = 0.9;  // planned substep / linear bound
 };
 
 struct Scene {

@@ -7,29 +7,29 @@ namespace weft {
 
 // A textile in measured units, independent of the mesh. Warp runs along a row, weft along a column.
 struct MeasuredTextile {
-  double areal_density = 0;        // kg/m^2
-  double tensile_warp = 0;         // N/m
-  double tensile_weft = 0;         // N/m
-  double shear = 0;                // N/m per radian
-  double bend_rigidity_warp = 0;   // N m
-  double bend_rigidity_weft = 0;   // N m
-  double air_drag = 0;             // kg/(m^2 s)
+  double areal_density = 0;       // kg/m^2
+  double tensile_warp = 0;        // N/m
+  double tensile_weft = 0;        // N/m
+  double shear = 0;               // N/m per radian
+  double bend_rigidity_warp = 0;  // N m
+  double bend_rigidity_weft = 0;  // N m
+  double air_drag = 0;            // kg/(m^2 s)
 };
 
 // The paper's constants: one for every particle or connection of a mesh.
 struct RawTextile {
-  double particle_mass = 0;        // kg
-  double stretch = 0;              // k_s, N/m
-  double shear = 0;                // k_s of the diagonals, N/m
-  double bend = 0;                 // k_b, N m^2
-  std::optional<double> clamp;     // c_b, N/m; absent: stretch
-  double air_drag = 0;             // kg/s
+  double particle_mass = 0;     // kg
+  double stretch = 0;           // k_s, N/m
+  double shear = 0;             // k_s of the diagonals, N/m
+  double bend = 0;              // k_b, N m^2
+  std::optional<double> clamp;  // c_b, N/m; absent: stretch
+  double air_drag = 0;          // kg/s
 };
 
 struct Textile {
   std::variant<MeasuredTextile, RawTextile> model;
-  double damping = 2e-4;           // k_d, kg/s
-  double friction = 0.3;           // Coulomb coefficient
+  double damping = 2e-4;  // k_d, kg/s
+  double friction = 0.3;  // Coulomb coefficient
 };
 
 }  // namespace weft

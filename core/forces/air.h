@@ -1,0 +1,16 @@
+#pragma once
+
+#include "core/model/mesh.h"
+
+namespace weft {
+
+// Velocity of the air at a time, m/s.
+Vector3d air_velocity(const Wind& wind, double time);
+
+// Adds the force of moving air on every triangle, a third to each corner:
+// F = 1/2 rho A |v_n| v_n n + c_t A v_t, v = air minus facet velocity. x: m; v: m/s; force: N. (3 x
+// n)
+void add_wind_forces(const Wind& wind, const Mesh& mesh, double time, const Matrix3Xd& x,
+                     const Matrix3Xd& v, Matrix3Xd& force);
+
+}  // namespace weft

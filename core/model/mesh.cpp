@@ -1,0 +1,184 @@
+#include "core/model/mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace weft {
+namespace {
+
+// Connections from every particle to the one `rows` and `columns` away.
+enum class Part { kAll, kEdge, kInside };
+
+std::vector<Connection> connections(const Grid& grid, int rows, int columns,
+                                    Part part = Part::kAll) {
+  std::vector<Connection> out;
+  for (int r = 0; r + rows < grid.rows; ++r) {
+    for (int c = std::max(0, -columns); c < grid.columns && c + columns < grid.columns; ++c) {
+      const bool edge = rows == 0 ? r == 0 || r == grid.rows - 1 : c == 0 || c == grid.columns - 1;
+      if (part == Part::kAll || edge == (part == Part::kEdge))
+        out.emplace_back(r * grid.columns + c, (r + rows) * grid.columns + c + columns);
+    }
+  }
+  return out;
+}
+
+// Constants of a textile on a mesh. Along an edge, half of the sheet is missing: edge_share.
+struct Constants {
+  double edge_share;
+  double stretch_warp, stretch_weft, shear;       // N/m
+  double bend_warp, bend_weft, bend_diagonal;     // k_b, N m^2
+  double clamp_warp, clamp_weft, clamp_diagonal;  // c_b, N/m
+  double rigidity_warp, rigidity_weft;            // B, N m
+};
+
+Constants constants(const RawTextile& raw, double h, bool) {
+  const double clamp = raw.clamp.value_or(raw.stretch);
+  const double rigidity = 1.5 * raw.bend / h;  // k_b = 2/3 B h, solved for B
+  return {1.0,      raw.stretch, raw.stretch, raw.shear, raw.bend, raw.bend,
+          raw.bend, clamp,       clamp,       clamp,     rigidity, rigidity};
+}
+
+// An interlaced connection of strip width h bends like a beam of rigidity B h when k_b = 2/3 B h;
+// diagonals carry 2/9 of the mean rigidity along each axis.
+Constants constants(const MeasuredTextile& textile, double h, bool diagonal_bend) {
+  const double warp = textile.bend_rigidity_warp, weft = textile.bend_rigidity_weft;
+  const double carried = diagonal_bend ? 2.0 / 9 * (warp + weft) / 2 : 0;
+  return {0.5,
+          textile.tensile_warp,
+          textile.tensile_weft,
+          2 * textile.shear,
+          std::max(0.0, 2.0 / 3 * warp - carried) * h,
+          std::max(0.0, 2.0 / 3 * weft - carried) * h,
+          2 * carried * h / std::numbers::sqrt2,
+          textile.tensile_warp,
+          textile.tensile_weft,
+          2 * textile.shear,
+          warp,
+          weft};
+}
+
+void add_stretch(Mesh& mesh, const Grid& grid, int rows, int columns, double k, double edge_share) {
+  const auto add = [&](Part part, double share) {
+    mesh.families.push_back({FamilyKind::kStretch, grid.spacing, k * share, std::nullopt,
+                             connections(grid, rows, columns, part)});
+  };
+  if (edge_share == 1) return add(Part::kAll, 1);
+  add(Part::kInside, 1);
+  add(Part::kEdge, edge_share);
+}
+
+void add_bend(Mesh& mesh, const Grid& grid, const ChoiKo& law, int rows, int columns, double k_b,
+              double c_b, double edge_share) {
+  const bool diagonal = rows != 0 && columns != 0;
+  const double length = grid.spacing * std::hypot(rows, columns);
+  const auto add = [&](Part part, double share) {
+    Family& family = mesh.families.emplace_back(
+        Family{diagonal ? FamilyKind::kDiagonalBend : FamilyKind::kBend, length, 0, std::nullopt,
+               connections(grid, rows, columns, part)});
+    // max(f_b, c_b (l - L)) is 0 where either constant is
+    if (k_b > 0 && c_b > 0) family.bend = BendingForce(law, k_b * share, c_b * share, length);
+  };
+  if (edge_share == 1 || diagonal) return add(Part::kAll, 1);
+  add(Part::kInside, 1);
+  add(Part::kEdge, edge_share);
+}
+
+// Bergou et al. 2006 on a lattice: B / 2 |x_(i-1) - 2 x_i + x_(i+1)|^2 w / h^3 along each axis, w
+// the width of the strip, and B_t |x_00 - x_01 - x_10 + x_11|^2 / h^2 for the twist of a cell.
+void add_stencils(Mesh& mesh, const Grid& grid, const Constants& k) {
+  const double h = grid.spacing;
+  const auto add_axis = [&](int rows, int columns, double rigidity) {
+    for (const Part part : {Part::kInside, Part::kEdge}) {
+      const double width = part == Part::kEdge ? h * k.edge_share : h;
+      for (const auto& [i, j] : connections(grid, rows, columns, part))
+        mesh.stencils.push_back(
+            {{i, (i + j) / 2, j, j}, {1, -2, 1, 0}, rigidity * width / (h * h * h)});
+    }
+  };
+  add_axis(0, 2, k.rigidity_warp);
+  add_axis(2, 0, k.rigidity_weft);
+  const double twist = k.rigidity_warp + k.rigidity_weft;  // 2 B_t
+  for (const auto& [i, j] : connections(grid, 1, 1))
+    mesh.stencils.push_back({{i, i + 1, j - 1, j}, {1, -1, -1, 1}, twist / (h * h)});
+  std::erase_if(mesh.stencils, [](const Stencil& stencil) { return stencil.stiffness == 0; });
+}
+
+}  // namespace
+
+Mesh make_lattice(const SheetDefinition& sheet) {
+  const Grid& grid = sheet.grid;
+  const double h = grid.spacing;
+  const ChoiKo* choi_ko = std::get_if<ChoiKo>(&sheet.bending);
+  const bool diagonal_bend = choi_ko != nullptr && choi_ko->diagonal_bend;
+  const Constants k =
+      std::visit([&](const auto& textile) { return constants(textile, h, diagonal_bend); },
+                 sheet.textile.model);
+
+  Mesh mesh;
+  mesh.damping = sheet.textile.damping;
+
+  // mass and drag: of the area that belongs to a particle, or one for all
+  mesh.mass.resize(sheet.particle_count());
+  mesh.drag.resize(sheet.particle_count());
+  for (int r = 0; r < grid.rows; ++r) {
+    for (int c = 0; c < grid.columns; ++c) {
+      const int i = r * grid.columns + c;
+      if (const auto* raw = std::get_if<RawTextile>(&sheet.textile.model)) {
+        mesh.mass[i] = raw->particle_mass;
+        mesh.drag[i] = raw->air_drag;
+      } else {
+        const auto& measured = std::get<MeasuredTextile>(sheet.textile.model);
+        const double share =
+            (r == 0 || r == grid.rows - 1 ? 0.5 : 1) * (c == 0 || c == grid.columns - 1 ? 0.5 : 1);
+        mesh.mass[i] = measured.areal_density * h * h * share;
+        mesh.drag[i] = measured.air_drag * h * h * share;
+      }
+    }
+  }
+
+  add_stretch(mesh, grid, 0, 1, k.stretch_warp, k.edge_share);
+  add_stretch(mesh, grid, 1, 0, k.stretch_weft, k.edge_share);
+  for (const int columns : {1, -1})
+    mesh.families.push_back({FamilyKind::kShear, h * std::numbers::sqrt2, k.shear, std::nullopt,
+                             connections(grid, 1, columns)});
+  if (choi_ko == nullptr) {
+    add_stencils(mesh, grid, k);
+  } else {
+    add_bend(mesh, grid, *choi_ko, 0, 2, k.bend_warp, k.clamp_warp, k.edge_share);
+    add_bend(mesh, grid, *choi_ko, 2, 0, k.bend_weft, k.clamp_weft, k.edge_share);
+    if (diagonal_bend)
+      for (const int columns : {2, -2})
+        add_bend(mesh, grid, *choi_ko, 2, columns, k.bend_diagonal, k.clamp_diagonal, k.edge_share);
+  }
+  // what pulls at nothing is not there
+  std::erase_if(mesh.families, [&](const Family& family) {
+    const bool idle = family.stiffness == 0 && !family.bend && mesh.damping == 0;
+    return idle || family.connections.empty();
+  });
+
+  for (const auto& [i, j] : connections(grid, 1, 1)) {
+    mesh.triangles.push_back({i, j - 1, i + 1});
+    mesh.triangles.push_back({j, i + 1, j - 1});
+  }
+  return mesh;
+}
+
+Matrix3Xd start_positions(const SheetDefinition& sheet) {
+  if (!sheet.start_positions.empty())
+    return Eigen::Map<const Matrix3Xd>(sheet.start_positions.data(), 3, sheet.particle_count());
+  Matrix3Xd x(3, sheet.particle_count());
+  const Eigen::Matrix3d rotation = sheet.rotation.normalized().toRotationMatrix();
+  for (int r = 0; r < sheet.grid.rows; ++r)
+    for (int c = 0; c < sheet.grid.columns; ++c)
+      x.col(r * sheet.grid.columns + c) =
+          sheet.origin + rotation * Vector3d(c * sheet.grid.spacing, 0, r * sheet.grid.spacing);
+  return x;
+}
+
+Matrix3Xd start_velocities(const SheetDefinition& sheet) {
+  if (sheet.start_velocities.empty()) return Matrix3Xd::Zero(3, sheet.particle_count());
+  return Eigen::Map<const Matrix3Xd>(sheet.start_velocities.data(), 3, sheet.particle_count());
+}
+
+}  // namespace weft

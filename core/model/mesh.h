@@ -1,0 +1,56 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/forces/bending_law.h"
+#include "core/model/scene.h"
+
+namespace weft {
+
+// (3 x particles) x, y, z of each particle in a column.
+using Eigen::Matrix3Xd;
+using Eigen::VectorXd;
+
+// Particles i and j, each pair once.
+using Connection = std::pair<int, int>;
+
+enum class FamilyKind { kStretch, kShear, kBend, kDiagonalBend };
+
+// Connections that share a law and its constants.
+struct Family {
+  FamilyKind kind;
+  double rest_length;                // L, m
+  double stiffness;                  // k of eq. 2, N/m; 0 for bend
+  std::optional<BendingForce> bend;  // eq. 3 to 5; absent: no force
+  std::vector<Connection> connections;
+};
+
+// Energy stiffness / 2 |sum weight_k x_k|^2 over up to four particles: the isometric law.
+struct Stencil {
+  std::array<int, 4> particle;
+  std::array<double, 4> weight;
+  double stiffness;  // N/m
+};
+
+// Particles and connections: all that forces know of a sheet. A rectangular lattice makes one.
+struct Mesh {
+  VectorXd mass;       // (particles) kg
+  VectorXd drag;       // (particles) in still air, kg/s
+  double damping = 0;  // k_d of every connection, kg/s
+  std::vector<Family> families;
+  std::vector<Stencil> stencils;
+  std::vector<std::array<int, 3>> triangles;
+};
+
+Mesh make_lattice(const SheetDefinition& sheet);
+
+// Positions at the start: those given, or the lattice as it is placed.
+Matrix3Xd start_positions(const SheetDefinition& sheet);
+// Velocities at the start, m/s.
+Matrix3Xd start_velocities(const SheetDefinition& sheet);
+
+}  // namespace weft

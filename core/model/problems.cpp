@@ -1,0 +1,245 @@
+#include <charconv>
+#include <cmath>
+#include <set>
+
+#include "core/model/scene.h"
+
+namespace weft {
+namespace {
+
+std::string text(double value) {
+  char buffer[32];
+  const auto [end, error] = std::to_chars(buffer, buffer + sizeof buffer, value);
+  return {buffer, end};
+}
+
+std::string at(const std::string& field, std::size_t index) {
+  return field + "[" + std::to_string(index) + "]";
+}
+
+// Collects problems; every bound is stated where it is checked.
+class Check {
+ public:
+  // Beyond this many the list says no more than it already does.
+  static constexpr std::size_t kMost = 1000;
+
+  void problem(const std::string& field, const std::string& message) {
+    if (problems_.size() < kMost) problems_.push_back({field, message});
+  }
+
+  // False, and a problem, unless the value is a number from `low` to `high`.
+  bool number(const std::string& field, double value, double low, double high, const char* unit) {
+    if (value >= low && value <= high) return true;  // false for NaN
+    const std::string suffix = *unit == '\0' ? "" : std::string(" ") + unit;
+    problem(field,
+            text(value) + suffix + " is not within " + text(low) + " to " + text(high) + suffix);
+    return false;
+  }
+
+  void vector(const std::string& field, const Vector3d& value, double most, const char* unit) {
+    number(field + ".x", value.x(), -most, most, unit);
+    number(field + ".y", value.y(), -most, most, unit);
+    number(field + ".z", value.z(), -most, most, unit);
+  }
+
+  void position(const std::string& field, const Vector3d& value) { vector(field, value, 1e4, "m"); }
+
+  void rotation(const std::string& field, const Quaterniond& q) {
+    constexpr double kMostPart = 1e6;
+    bool good = number(field + ".w", q.w(), -kMostPart, kMostPart, "");
+    good &= number(field + ".x", q.x(), -kMostPart, kMostPart, "");
+    good &= number(field + ".y", q.y(), -kMostPart, kMostPart, "");
+    good &= number(field + ".z", q.z(), -kMostPart, kMostPart, "");
+    if (good && q.norm() < 1e-9) problem(field, "has length " + text(q.norm()) + "; must not be 0");
+  }
+
+  void path(const std::string& field, const Path& path) {
+    for (std::size_t k = 0; k < path.size(); ++k) {
+      const std::string key = at(field, k);
+      const bool good = number(key + ".time_s", path[k].time, 0, 1e6, "s");
+      if (good && k > 0 && path[k].time <= path[k - 1].time)
+        problem(key + ".time_s", text(path[k].time) +
+                                     " s does not come after the keyframe before it, " +
+                                     text(path[k - 1].time) + " s");
+      position(key + ".offset_m", path[k].offset);
+    }
+  }
+
+  // Names identify sheets and colliders.
+  void name(const std::string& field, const std::string& name, std::set<std::string>& taken) {
+    bool good = !name.empty() && name.size() <= 63;
+    for (const char c : name)
+      good &= (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
+    if (!good)
+      problem(field,
+              "\"" + name.substr(0, 80) + "\" is not 1 to 63 characters of a-z, 0-9, - and _");
+    else if (!taken.insert(name).second)
+      problem(field, "\"" + name + "\" is taken");
+  }
+
+  std::vector<Problem> take() { return std::move(problems_); }
+
+ private:
+  std::vector<Problem> problems_;
+};
+
+void check_model(const MeasuredTextile& t, const std::string& field, Check& check) {
+  const std::string f = field + ".measured.";
+  check.number(f + "areal_density_kg_per_m2", t.areal_density, 1e-4, 100, "kg/m^2");
+  check.number(f + "tensile_warp_n_per_m", t.tensile_warp, 0, 1e7, "N/m");
+  check.number(f + "tensile_weft_n_per_m", t.tensile_weft, 0, 1e7, "N/m");
+  check.number(f + "shear_n_per_m", t.shear, 0, 1e7, "N/m");
+  check.number(f + "bend_rigidity_warp_n_m", t.bend_rigidity_warp, 0, 10, "N m");
+  check.number(f + "bend_rigidity_weft_n_m", t.bend_rigidity_weft, 0, 10, "N m");
+  check.number(f + "air_drag_kg_per_m2_s", t.air_drag, 0, 1000, "kg/(m^2 s)");
+}
+
+void check_model(const RawTextile& t, const std::string& field, Check& check) {
+  const std::string f = field + ".raw.";
+  check.number(f + "particle_mass_kg", t.particle_mass, 1e-9, 1000, "kg");
+  check.number(f + "stretch_n_per_m", t.stretch, 0, 1e7, "N/m");
+  check.number(f + "shear_n_per_m", t.shear, 0, 1e7, "N/m");
+  check.number(f + "bend_n_m2", t.bend, 0, 10, "N m^2");
+  if (t.clamp) check.number(f + "clamp_n_per_m", *t.clamp, 0, 1e7, "N/m");
+  check.number(f + "air_drag_kg_per_s", t.air_drag, 0, 1000, "kg/s");
+}
+
+void check_textile(const Textile& textile, const std::string& field, Check& check) {
+  std::visit([&](const auto& model) { check_model(model, field, check); }, textile.model);
+  check.number(field + ".damping_kg_per_s", textile.damping, 0, 1000, "kg/s");
+  check.number(field + ".friction_coefficient", textile.friction, 0, 10, "");
+}
+
+void check_values(const std::string& field, const std::vector<double>& values, int particles,
+                  double most, const char* unit, Check& check) {
+  if (values.empty()) return;
+  const std::size_t wanted = 3 * static_cast<std::size_t>(particles);
+  if (values.size() != wanted)
+    return check.problem(field, "has " + std::to_string(values.size()) + " values; " +
+                                    std::to_string(wanted) + " (3 x particles) or none are needed");
+  for (std::size_t i = 0; i < values.size(); ++i)
+    check.number(at(field, i), values[i], -most, most, unit);
+}
+
+void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& check) {
+  constexpr int kMostRows = 4096;
+  const std::string grid = field + ".grid.";
+  bool sized = check.number(grid + "rows", sheet.grid.rows, 2, kMostRows, "");
+  sized &= check.number(grid + "columns", sheet.grid.columns, 2, kMostRows, "");
+  check.number(grid + "spacing_m", sheet.grid.spacing, 1e-5, 10, "m");
+  check_textile(sheet.textile, field + ".textile", check);
+
+  if (const auto* law = std::get_if<ChoiKo>(&sheet.bending)) {
+    check.number(field + ".bending.choi_ko.segments", law->segments, 1, 65536, "");
+    check.number(field + ".bending.choi_ko.degree", law->degree, 1, 24, "");
+    if (law->fold_clamp && law->evaluator != Evaluator::kLinearized)
+      check.problem(field + ".bending.choi_ko.fold_clamp",
+                    "true is for the evaluator LINEARIZED only");
+  }
+  check.position(field + ".placement.origin_m", sheet.origin);
+  check.rotation(field + ".placement.rotation", sheet.rotation);
+  if (sheet.skin) check.number(field + ".skin_m", *sheet.skin, 0, 1, "m");
+  if (!sized) return;
+
+  check_values(field + ".start_positions_m", sheet.start_positions, sheet.particle_count(), 1e4,
+               "m", check);
+  check_values(field + ".start_velocities_m_per_s", sheet.start_velocities, sheet.particle_count(),
+               1000, "m/s", check);
+  std::set<int> pinned;
+  for (std::size_t p = 0; p < sheet.pins.size(); ++p) {
+    const std::string pin = at(field + ".pins", p);
+    const std::vector<int>& particles = sheet.pins[p].particles;
+    if (particles.empty())
+      check.problem(pin + ".particles", "is empty; a pin holds 1 particle or more");
+    for (std::size_t k = 0; k < particles.size(); ++k) {
+      const std::string particle = at(pin + ".particles", k);
+      if (check.number(particle, particles[k], 0, sheet.particle_count() - 1, "") &&
+          !pinned.insert(particles[k]).second)
+        check.problem(particle, std::to_string(particles[k]) + " is pinned twice");
+    }
+    check.path(pin + ".path", sheet.pins[p].path);
+  }
+}
+
+void check_shape(const Plane& plane, const std::string& field, Check& check) {
+  check.position(field + ".plane.point_m", plane.point);
+  check.vector(field + ".plane.normal", plane.normal, 1e6, "");
+  if (plane.normal.norm() < 1e-9)
+    check.problem(field + ".plane.normal",
+                  "has length " + text(plane.normal.norm()) + "; must not be 0");
+}
+
+constexpr double kSmallest = 1e-6, kLargest = 1e4;  // of a body, m
+
+void check_shape(const Sphere& sphere, const std::string& field, Check& check) {
+  check.position(field + ".sphere.center_m", sphere.center);
+  check.number(field + ".sphere.radius_m", sphere.radius, kSmallest, kLargest, "m");
+}
+
+void check_shape(const Box& box, const std::string& field, Check& check) {
+  check.position(field + ".box.center_m", box.center);
+  const std::string half = field + ".box.half_size_m.";
+  check.number(half + "x", box.half_size.x(), kSmallest, kLargest, "m");
+  check.number(half + "y", box.half_size.y(), kSmallest, kLargest, "m");
+  check.number(half + "z", box.half_size.z(), kSmallest, kLargest, "m");
+  check.rotation(field + ".box.rotation", box.rotation);
+}
+
+void check_shape(const Capsule& capsule, const std::string& field, Check& check) {
+  check.position(field + ".capsule.start_m", capsule.start);
+  check.position(field + ".capsule.end_m", capsule.end);
+  check.number(field + ".capsule.radius_m", capsule.radius, kSmallest, kLargest, "m");
+}
+
+void check_environment(const Environment& environment, Check& check) {
+  check.vector("environment.gravity_m_per_s2", environment.gravity, 1000, "m/s^2");
+  if (!environment.wind) return;
+  const Wind& wind = *environment.wind;
+  const std::string f = "environment.wind.";
+  check.vector(f + "velocity_m_per_s", wind.velocity, 200, "m/s");
+  check.number(f + "gust", wind.gust, 0, 1, "");
+  check.number(f + "gust_period_s", wind.gust_period, 1e-3, 1e4, "s");
+  check.number(f + "air_density_kg_per_m3", wind.air_density, 0, 10, "kg/m^3");
+  check.number(f + "tangential_drag_kg_per_m2_s", wind.tangential_drag, 0, 1000, "kg/(m^2 s)");
+}
+
+void check_solver(const SolverSettings& solver, Check& check) {
+  check.number("solver.frame_step_s", solver.frame_step, 1e-6, 10, "s");
+  if (solver.substep) check.number("solver.substep_s", *solver.substep, 1e-9, 10, "s");
+  check.number("solver.safety", solver.safety, 0.01, 1, "");
+}
+
+}  // namespace
+
+std::vector<Problem> find_problems(const Scene& scene) {
+  constexpr std::size_t kMostSheets = 64, kMostColliders = 256;
+  Check check;
+  check.number("sheets", static_cast<double>(scene.sheets.size()), 1, kMostSheets, "elements");
+  check.number("colliders", static_cast<double>(scene.colliders.size()), 0, kMostColliders,
+               "elements");
+  std::set<std::string> sheet_names, collider_names;
+  for (std::size_t s = 0; s < scene.sheets.size(); ++s) {
+    const std::string field = at("sheets", s);
+    check.name(field + ".name", scene.sheets[s].name, sheet_names);
+    check_sheet(scene.sheets[s], field, check);
+  }
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c) {
+    const Collider& collider = scene.colliders[c];
+    const std::string field = at("colliders", c);
+    check.name(field + ".name", collider.name, collider_names);
+    std::visit([&](const auto& shape) { check_shape(shape, field, check); }, collider.shape);
+    check.number(field + ".friction_coefficient", collider.friction, 0, 10, "");
+    check.path(field + ".path", collider.path);
+  }
+  check_environment(scene.environment, check);
+  check_solver(scene.solver, check);
+  return check.take();
+}
+
+std::vector<Problem> find_problems(const Textile& textile, const std::string& field) {
+  Check check;
+  check_textile(textile, field, check);
+  return check.take();
+}
+
+}  // namespace weft

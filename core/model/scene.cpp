@@ -1,0 +1,18 @@
+#include "core/model/scene.h"
+
+#include <algorithm>
+
+namespace weft {
+
+Vector3d offset_at(const Path& path, double time) {
+  if (path.empty()) return Vector3d::Zero();
+  const auto next = std::upper_bound(path.begin(), path.end(), time,
+                                     [](double t, const Keyframe& key) { return t < key.time; });
+  if (next == path.begin()) return path.front().offset;
+  if (next == path.end()) return path.back().offset;
+  const Keyframe& before = *(next - 1);
+  const double share = (time - before.time) / (next->time - before.time);
+  return before.offset + share * (next->offset - before.offset);
+}
+
+}  // namespace weft

@@ -1,0 +1,33 @@
+#include "core/motion/integrator.h"
+
+namespace weft {
+
+std::unique_ptr<Integrator> make_integrator(IntegratorKind kind) {
+  switch (kind) {
+    case IntegratorKind::kEuler:
+      return make_euler();
+    case IntegratorKind::kMidpoint:
+      return make_midpoint();
+    case IntegratorKind::kRk4:
+      return make_rk4();
+    case IntegratorKind::kVerlet:
+      break;
+  }
+  return make_verlet();
+}
+
+void accelerate(const Dynamics& dynamics, double time, const Matrix3Xd& x, const Matrix3Xd& v,
+                Matrix3Xd& a) {
+  dynamics.force(time, x, v, a);
+  if (dynamics.drag.size() > 0) {
+    const Vector3d air = dynamics.air(time);
+    for (Eigen::Index i = 0; i < a.cols(); ++i) a.col(i) += dynamics.drag[i] * (air - v.col(i));
+  }
+  for (Eigen::Index i = 0; i < a.cols(); ++i) {
+    const double inverse_mass = dynamics.inverse_mass[i];
+    a.col(i) = inverse_mass == 0 ? Vector3d(Vector3d::Zero())
+                                 : Vector3d(inverse_mass * a.col(i) + dynamics.gravity);
+  }
+}
+
+}  // namespace weft

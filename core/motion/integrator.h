@@ -1,0 +1,54 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "core/model/mesh.h"
+
+namespace weft {
+
+// Motion of one sheet, (3 x particles) each.
+struct Motion {
+  Matrix3Xd x;           // position, m
+  Matrix3Xd d;           // displacement of the last step, m; velocity x step where not Verlet
+  Matrix3Xd d_previous;  // displacement of the step before it, m
+};
+
+// What moves a sheet.
+struct Dynamics {
+  // Writes all forces but drag and weight, N, given time, positions and velocities.
+  std::function<void(double, const Matrix3Xd&, const Matrix3Xd&, Matrix3Xd&)> force;
+  VectorXd inverse_mass;  // 1/kg, 0: held; such a particle keeps its d
+  VectorXd drag;          // kg/s, or empty
+  Vector3d gravity;       // m/s^2
+  // Velocity of the air that drags, m/s.
+  std::function<Vector3d(double)> air;
+};
+
+// Steps a sheet in time. dt in s.
+class Integrator {
+ public:
+  virtual ~Integrator() = default;
+  // Sets d and d_previous from x at `time` and velocities v.
+  virtual void start(const Dynamics& dynamics, double time, double dt, const Matrix3Xd& v,
+                     Motion& motion) = 0;
+  // Advances x, d and d_previous from `time` by dt.
+  virtual void advance(const Dynamics& dynamics, double time, double dt, Motion& motion) = 0;
+  // Goes over from steps of dt to steps of new_dt at `time`.
+  virtual void change_step(const Dynamics& dynamics, double time, double dt, double new_dt,
+                           Motion& motion) = 0;
+  // Velocities of the present state, m/s.
+  virtual void velocity(const Motion& motion, double dt, Matrix3Xd& v) const = 0;
+};
+
+std::unique_ptr<Integrator> make_verlet();
+std::unique_ptr<Integrator> make_euler();
+std::unique_ptr<Integrator> make_midpoint();
+std::unique_ptr<Integrator> make_rk4();
+std::unique_ptr<Integrator> make_integrator(IntegratorKind kind);
+
+// Acceleration with every force, m/s^2; 0 for held particles.
+void accelerate(const Dynamics& dynamics, double time, const Matrix3Xd& x, const Matrix3Xd& v,
+                Matrix3Xd& a);
+
+}  // namespace weft

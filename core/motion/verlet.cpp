@@ -1,0 +1,66 @@
+#include "core/motion/integrator.h"
+
+namespace weft {
+namespace {
+
+// Velocity-less Verlet (eq. 8) in summed form: d' = d + a dt^2, x' = x + d'. Second order with
+// damping: forces see the velocity extrapolated to the present, (3 d - d_previous) / (2 dt); drag
+// is centred, -c (d' + d) / (2 dt).
+class Verlet : public Integrator {
+ public:
+  void start(const Dynamics& dynamics, double time, double dt, const Matrix3Xd& v,
+             Motion& motion) override {
+    // half a kick: x(-dt) = x - v dt + a dt^2 / 2
+    accelerate(dynamics, time, motion.x, v, a_);
+    motion.d = v * dt - a_ * (dt * dt / 2);
+    motion.d_previous = 3 * motion.d - v * (2 * dt);
+  }
+
+  void advance(const Dynamics& dynamics, double time, double dt, Motion& motion) override {
+    velocity(motion, dt, v_);
+    dynamics.force(time, motion.x, v_, a_);
+    motion.d_previous.swap(motion.d);
+    const bool drag = dynamics.drag.size() > 0;
+    const Vector3d air = drag ? dynamics.air(time) : Vector3d(Vector3d::Zero());
+    for (Eigen::Index i = 0; i < a_.cols(); ++i) {
+      const double inverse_mass = dynamics.inverse_mass[i];
+      if (inverse_mass == 0) {
+        motion.d.col(i) = motion.d_previous.col(i);
+        continue;
+      }
+      Vector3d a = inverse_mass * a_.col(i) + dynamics.gravity;
+      if (drag) {
+        const double rate = dynamics.drag[i] * inverse_mass;  // 1/s
+        a += rate * air;
+        motion.d.col(i) =
+            ((1 - rate * dt / 2) * motion.d_previous.col(i) + a * (dt * dt)) / (1 + rate * dt / 2);
+      } else {
+        motion.d.col(i) = motion.d_previous.col(i) + a * (dt * dt);
+      }
+    }
+    motion.x += motion.d;
+  }
+
+  // The new d is the displacement that steps of new_dt would have had; the extrapolated velocity
+  // stays.
+  void change_step(const Dynamics& dynamics, double time, double dt, double new_dt,
+                   Motion& motion) override {
+    velocity(motion, dt, v_);
+    accelerate(dynamics, time, motion.x, v_, a_);
+    motion.d = motion.d * (new_dt / dt) + a_ * (new_dt * (dt - new_dt) / 2);
+    motion.d_previous = 3 * motion.d - v_ * (2 * new_dt);
+  }
+
+  void velocity(const Motion& motion, double dt, Matrix3Xd& v) const override {
+    v = (3 * motion.d - motion.d_previous) / (2 * dt);
+  }
+
+ private:
+  Matrix3Xd v_, a_;
+};
+
+}  // namespace
+
+std::unique_ptr<Integrator> make_verlet() { return std::make_unique<Verlet>(); }
+
+}  // namespace weft

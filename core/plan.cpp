@@ -1,0 +1,171 @@
+#include "core/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "core/motion/stability.h"
+
+namespace weft {
+namespace {
+
+constexpr double kStandardGravity = 9.80665;  // m/s^2
+
+template <class... Parts>
+std::string join(const Parts&... parts) {
+  std::ostringstream out;
+  out.precision(4);
+  (out << ... << parts);
+  return out.str();
+}
+
+std::string sheet_path(std::size_t index) { return "sheets[" + std::to_string(index) + "]"; }
+
+// Rate at which wind damps a sheet, an upper estimate that takes the sheet as nearly at rest, 1/s.
+double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& mesh) {
+  if (!scene.environment.wind) return 0;
+  const Wind& wind = *scene.environment.wind;
+  const double h = sheet.grid.spacing;
+  const double speed = wind.velocity.norm() * (1 + wind.gust);
+  return (wind.air_density * speed + wind.tangential_drag) * h * h / mesh.mass.minCoeff();
+}
+
+StepPlan plan_step(const Scene& scene, const std::vector<SheetShape>& shapes) {
+  const SolverSettings& solver = scene.solver;
+  StepPlan step;
+  step.linear_bound = step.estimated_bound = std::numeric_limits<double>::infinity();
+  for (std::size_t s = 0; s < shapes.size(); ++s) {
+    const SheetDefinition& sheet = scene.sheets[s];
+    const StableStep stable = stable_step(shapes[s].mesh, shapes[s].inverse_mass, solver.integrator,
+                                          air_rate(scene, sheet, shapes[s].mesh), shapes[s].x);
+    step.estimated_bound = std::min(step.estimated_bound, stable.estimate);
+    if (s > 0 && stable.linear_bound >= step.linear_bound) continue;
+    step.linear_bound = stable.linear_bound;
+    step.damping_ratio = stable.damping_ratio;
+    step.limiting_sheet = sheet.name;
+  }
+
+  // an asked step that divides the frame step up to rounding is taken as it is
+  constexpr double kRounding = 1e-9;
+  const double longest = solver.substep.value_or(solver.safety * step.linear_bound);
+  const double count = std::ceil(solver.frame_step / longest * (1 - kRounding));
+  step.substeps = static_cast<std::int64_t>(std::clamp(count, 1.0, 1e18));
+  step.substep = solver.frame_step / static_cast<double>(step.substeps);
+  return step;
+}
+
+void describe_families(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan) {
+  const auto describe = [&](FamilyKind kind, const char* name, const std::string& why_idle) {
+    std::size_t pulling = 0;
+    for (const Family& family : mesh.families)
+      if (family.kind == kind && (family.stiffness > 0 || family.bend))
+        pulling += family.connections.size();
+    const std::string pass = join(sheet.name, ": ", name);
+    if (pulling > 0)
+      plan.passes.push_back(join(pass, ", ", pulling, " connections"));
+    else
+      plan.skipped.push_back({pass, why_idle});
+  };
+  describe(FamilyKind::kStretch, "stretch", "its stiffness is 0");
+  describe(FamilyKind::kShear, "shear", "its stiffness is 0");
+  if (const auto* law = std::get_if<ChoiKo>(&sheet.bending)) {
+    const char* no_bend = "k_b or c_b is 0, or the sheet is too small";
+    describe(FamilyKind::kBend, "bend", no_bend);
+    describe(FamilyKind::kDiagonalBend, "diagonal bend",
+             law->diagonal_bend ? no_bend : "diagonal_bend is off");
+  } else if (!mesh.stencils.empty()) {
+    plan.passes.push_back(
+        join(sheet.name, ": isometric bend, ", mesh.stencils.size(), " stencils"));
+  } else {
+    plan.skipped.push_back({join(sheet.name, ": isometric bend"), "the bending rigidity is 0"});
+  }
+  if (mesh.damping > 0)
+    plan.passes.push_back(join(sheet.name, ": damping"));
+  else
+    plan.skipped.push_back({join(sheet.name, ": damping"), "k_d is 0"});
+  if (mesh.drag.maxCoeff() > 0)
+    plan.passes.push_back(join(sheet.name, ": drag"));
+  else
+    plan.skipped.push_back({join(sheet.name, ": drag"), "the textile has no air drag"});
+}
+
+void warn_of_bending(const Scene& scene, std::size_t index, const Mesh& mesh, Plan& plan) {
+  const SheetDefinition& sheet = scene.sheets[index];
+  const auto* law = std::get_if<ChoiKo>(&sheet.bending);
+  if (law == nullptr || law->fold_clamp) return;
+
+  std::size_t inert = 0, bending = 0;
+  for (const Family& family : mesh.families) {
+    bending += family.bend ? 1 : 0;
+    inert += family.bend && family.bend->clamp_rules() ? 1 : 0;
+  }
+  if (inert > 0)
+    plan.warnings.push_back(
+        {"CLAMP_RULES", sheet_path(index) + ".textile",
+         join("c_b L^3 / k_b is below ", kClampRules, inert == bending ? " for every" : " for some",
+              " bend connection: the clamp of eq. 5 rules there, so k_b and the evaluator have no "
+              "effect. Use a smaller k_b, a larger c_b, a larger spacing, or ISOMETRIC")});
+
+  const auto* measured = std::get_if<MeasuredTextile>(&sheet.textile.model);
+  if (measured == nullptr) return;
+  // h_min = (96 B / (c_b kappa^2))^(1/4) / 2 with kappa = (rho g / B)^(1/3): bending below it is
+  // lost
+  const double gravity = scene.environment.gravity.norm();
+  const double weight = measured->areal_density * (gravity > 0 ? gravity : kStandardGravity);
+  double finest = 0;
+  for (const auto& [rigidity, clamp] :
+       {std::pair(measured->bend_rigidity_warp, measured->tensile_warp),
+        std::pair(measured->bend_rigidity_weft, measured->tensile_weft)}) {
+    if (rigidity <= 0 || clamp <= 0) continue;
+    const double kappa = std::cbrt(weight / rigidity);
+    finest = std::max(finest, std::pow(96 * rigidity / (clamp * kappa * kappa), 0.25) / 2);
+  }
+  if (sheet.grid.spacing < finest)
+    plan.warnings.push_back(
+        {"MESH_TOO_FINE", sheet_path(index) + ".grid.spacing_m",
+         join(
+             "a spacing of ", sheet.grid.spacing, " m is below ", finest,
+             " m, under which interlaced connections lose the bending rigidity of this textile: it "
+             "will hang too limp. Use a larger spacing or ISOMETRIC")});
+}
+
+void warn(const Scene& scene, const std::vector<SheetShape>& shapes, Plan& plan) {
+  plan.warnings.push_back({"NO_SELF_COLLISION", "", "a sheet may pass through itself"});
+  if (scene.sheets.size() > 1)
+    plan.warnings.push_back(
+        {"NO_SHEET_SHEET_COLLISION", "sheets", "sheets may pass through each other"});
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
+    if (std::holds_alternative<Box>(scene.colliders[c].shape))
+      plan.warnings.push_back(
+          {"BOX_EDGES", "colliders[" + std::to_string(c) + "].box",
+           "only particles are kept out: an edge of the box may cut through the "
+           "cells between them"});
+  for (std::size_t s = 0; s < shapes.size(); ++s) warn_of_bending(scene, s, shapes[s].mesh, plan);
+  if (plan.step.substep > plan.step.linear_bound)
+    plan.warnings.push_back(
+        {"STEP_UNSTABLE", "solver.substep_s",
+         join("the substep of ", plan.step.substep, " s lies above the linear bound of ",
+              plan.step.linear_bound, " s: the run may diverge")});
+}
+
+}  // namespace
+
+Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes) {
+  Plan plan;
+  plan.step = plan_step(scene, shapes);
+  for (std::size_t s = 0; s < shapes.size(); ++s)
+    describe_families(scene.sheets[s], shapes[s].mesh, plan);
+  const auto pass = [&](const char* name, bool runs, const char* why_not) {
+    if (runs)
+      plan.passes.emplace_back(name);
+    else
+      plan.skipped.push_back({name, why_not});
+  };
+  pass("wind", scene.environment.wind.has_value(), "the scene has none");
+  pass("contact", !scene.colliders.empty(), "the scene has no collider");
+  warn(scene, shapes, plan);
+  return plan;
+}
+
+}  // namespace weft

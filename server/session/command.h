@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <variant>
+#include <vector>
+
+#include "core/simulation.h"
+#include "server/session/frame.h"
+
+// What can be asked of a session between two frames, and how it answers.
+namespace weft {
+
+// Why a command was not carried out.
+struct Refusal {
+  enum class Why {
+    kDeleted,      // the session is gone
+    kDraining,     // the server is going
+    kBusy,         // too many commands wait
+    kRunning,      // stepping needs a paused session
+    kFailed,       // the solver diverged
+    kStale,        // expected_frame is not the newest frame
+    kNotAhead,     // until_frame is not past the newest frame
+    kInterrupted,  // the step was paused
+    kCancelled,    // the caller went away
+    kInvalid,      // see problems
+    kUnstable,     // see step
+  };
+  Why why;
+  std::int64_t frame = 0;         // newest frame
+  std::vector<Problem> problems;
+  StepRefusal step;
+};
+
+// How a session stood when a command had been carried out.
+struct Applied {
+  std::int64_t frame = 0;             // first frame in which it shows
+  std::shared_ptr<const Frame> newest;
+  Textile textile;                    // of SetTextile
+  std::shared_ptr<const Plan> plan;
+};
+
+using Outcome = std::variant<Applied, Refusal>;
+
+// Called exactly once, from any thread, with no lock held. Must not block.
+using Done = std::function<void(const Outcome&)>;
+
+// Computes frames; refused while running. Stops at the next frame once `cancelled`.
+struct StepCommand {
+  std::int64_t frames = 1;
+  std::optional<std::int64_t> expected_frame;
+  std::stop_token cancelled;
+  Done done;
+};
+
+// Advances until paused, or until a goal is met. Replaces pace and goal of a run under way.
+struct RunCommand {
+  std::optional<double> time_scale;  // simulated s per s; absent: as fast as possible
+  std::optional<std::int64_t> until_frame;
+  bool until_rest = false;
+  Done done;
+};
+
+// Ends a run, and steps under way.
+struct PauseCommand {
+  Done done;
+};
+
+// What becomes of a textile, or why it cannot.
+using TextileEdit = std::function<std::variant<Textile, std::vector<Problem>>(const Textile&)>;
+
+// Changes the textile of a sheet. Precondition: the sheet exists; find_problems has nothing to say of
+// what `edit` answers.
+struct SetTextile {
+  std::size_t sheet = 0;
+  TextileEdit edit;
+  Done done;
+};
+
+using Command = std::variant<StepCommand, RunCommand, PauseCommand, SetTextile>;
+
+}  // namespace weft

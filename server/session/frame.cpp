@@ -1,0 +1,23 @@
+#include "server/session/frame.h"
+
+#include <utility>
+
+namespace weft {
+
+std::shared_ptr<const void> EncodingCache::get(int key, const std::function<Encoding()>& make) const {
+  std::lock_guard lock(mutex_);
+  if (const auto found = encodings_.find(key); found != encodings_.end()) return found->second;
+  Encoding made = make();
+  bytes_ += made.bytes;
+  if (meter_) *meter_ += made.bytes;
+  return encodings_.emplace(key, std::move(made.data)).first->second;
+}
+
+void EncodingCache::count_in(ByteMeter meter) const {
+  std::lock_guard lock(mutex_);
+  if (meter_) *meter_ -= bytes_;
+  meter_ = std::move(meter);
+  if (meter_) *meter_ += bytes_;
+}
+
+}  // namespace weft

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "core/simulation.h"
+
+namespace weft {
+
+// Something made of a frame, such as its bytes on the wire.
+struct Encoding {
+  std::shared_ptr<const void> data;
+  std::size_t bytes = 0;
+};
+
+// Bytes held by many objects together.
+using ByteMeter = std::shared_ptr<std::atomic<std::size_t>>;
+
+// Encodings of one frame: each made once for all watchers, and gone with the frame.
+class EncodingCache {
+ public:
+  // The encoding of `key`, made by the first who asks; whoever asks meanwhile waits for it.
+  std::shared_ptr<const void> get(int key, const std::function<Encoding()>& make) const;
+
+  // Counts the bytes of every encoding, those to come too, in `meter`; nullptr: nowhere any more.
+  void count_in(ByteMeter meter) const;
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::map<int, std::shared_ptr<const void>> encodings_;
+  mutable std::size_t bytes_ = 0;
+  mutable ByteMeter meter_;
+};
+
+// The state of a session at one time. Never changes once it is published.
+struct Frame {
+  std::int64_t number = 0;
+  double time = 0;                 // s
+  std::vector<double> positions;   // (3 x particles) planes x, y, z, m
+  std::vector<double> velocities;  // (3 x particles) planes x, y, z, m/s
+  FrameStats stats;
+  bool at_rest = false;
+  std::int64_t substeps = 0;       // since the frame before
+  double substep = 0;              // s
+  EncodingCache encodings;
+
+  std::size_t bytes() const {      // without encodings
+    return sizeof(Frame) + (positions.size() + velocities.size()) * sizeof(double);
+  }
+};
+
+}  // namespace weft

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+
+namespace weft {
+
+// What a server accepts. Published in GetServerInfo.
+struct Limits {
+  std::int64_t max_sessions = 256;
+  std::int64_t max_particles_per_session = 1'000'000;
+  std::int64_t history_bytes_per_session = 64 << 20;  // frames with their encodings
+  std::int64_t max_streams = 1024;
+  std::int64_t max_request_bytes = 16 << 20;
+  std::int64_t max_frame_bytes = 4 << 20;             // gRPC's default receive limit
+};
+
+}  // namespace weft

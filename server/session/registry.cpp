@@ -1,0 +1,71 @@
+#include "server/session/registry.h"
+
+#include <utility>
+
+namespace weft {
+
+std::optional<Registry::Refused> Registry::refusal(const std::string& id) const {
+  std::lock_guard lock(mutex_);
+  return refusal_locked(id);
+}
+
+std::optional<Registry::Refused> Registry::add(std::shared_ptr<Session> session) {
+  std::lock_guard lock(mutex_);
+  auto refused = refusal_locked(session->id());
+  if (!refused) sessions_.emplace(session->id(), std::move(session));
+  return refused;
+}
+
+std::optional<Registry::Refused> Registry::refusal_locked(const std::string& id) const {
+  if (closed_) return Refused::kClosed;
+  if (sessions_.contains(id)) return Refused::kExists;
+  if (sessions_.size() >= max_sessions_) return Refused::kFull;
+  return std::nullopt;
+}
+
+std::shared_ptr<Session> Registry::find(const std::string& id) const {
+  std::lock_guard lock(mutex_);
+  const auto found = sessions_.find(id);
+  return found == sessions_.end() ? nullptr : found->second;
+}
+
+std::vector<std::shared_ptr<Session>> Registry::list(const std::string& after,
+                                                     std::size_t count) const {
+  std::lock_guard lock(mutex_);
+  std::vector<std::shared_ptr<Session>> sessions;
+  for (auto next = sessions_.upper_bound(after);
+       next != sessions_.end() && sessions.size() < count; ++next) {
+    sessions.push_back(next->second);
+  }
+  return sessions;
+}
+
+std::size_t Registry::size() const {
+  std::lock_guard lock(mutex_);
+  return sessions_.size();
+}
+
+bool Registry::erase(const std::string& id) {
+  std::shared_ptr<Session> session;
+  {
+    std::lock_guard lock(mutex_);
+    const auto found = sessions_.find(id);
+    if (found == sessions_.end()) return false;
+    session = std::move(found->second);
+    sessions_.erase(found);
+  }
+  session->close(Refusal::Why::kDeleted);
+  return true;
+}
+
+void Registry::close(Refusal::Why why) {
+  std::map<std::string, std::shared_ptr<Session>> sessions;
+  {
+    std::lock_guard lock(mutex_);
+    closed_ = true;
+    sessions.swap(sessions_);
+  }
+  for (const auto& [id, session] : sessions) session->close(why);
+}
+
+}  // namespace weft

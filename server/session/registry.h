@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/session/session.h"
+
+namespace weft {
+
+// The sessions of a server by id, at most `max_sessions`. Thread-safe.
+class Registry {
+ public:
+  enum class Refused { kExists, kFull, kClosed };
+
+  explicit Registry(std::size_t max_sessions) : max_sessions_(max_sessions) {}
+
+  // Why a session of this id could not be added; nullopt: it could.
+  std::optional<Refused> refusal(const std::string& id) const;
+  std::optional<Refused> add(std::shared_ptr<Session> session);
+
+  std::shared_ptr<Session> find(const std::string& id) const;  // or nullptr
+
+  // In order of id, at most `count` of those after `after`.
+  std::vector<std::shared_ptr<Session>> list(const std::string& after, std::size_t count) const;
+  std::size_t size() const;
+
+  // Takes a session out and ends it. False where there is none.
+  bool erase(const std::string& id);
+
+  // Ends every session, and adds none any more.
+  void close(Refusal::Why why);
+
+ private:
+  std::optional<Refused> refusal_locked(const std::string& id) const;
+
+  std::size_t max_sessions_;
+  mutable std::mutex mutex_;
+  std::map<std::string, std::shared_ptr<Session>> sessions_;
+  bool closed_ = false;
+};
+
+}  // namespace weft

@@ -1,0 +1,126 @@
+#include "server/session/scheduler.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace weft {
+
+Scheduler::Scheduler(int threads) {
+  for (int i = 0; i < std::max(1, threads); ++i) threads_.emplace_back([this] { work(); });
+}
+
+Scheduler::~Scheduler() { stop(); }
+
+void Scheduler::wake(const std::shared_ptr<Task>& task) {
+  std::lock_guard lock(mutex_);
+  if (stopping_) return;
+  switch (task->phase_) {
+    case Task::Phase::kWaiting:
+      std::erase_if(waiting_, [&](const auto& entry) { return entry.second == task; });
+      [[fallthrough]];
+    case Task::Phase::kIdle:
+      queue(task);
+      return;
+    case Task::Phase::kRunning:
+      task->phase_ = Task::Phase::kRunningAndWoken;
+      return;
+    case Task::Phase::kQueued:
+    case Task::Phase::kRunningAndWoken:
+      return;
+  }
+}
+
+bool Scheduler::post(std::function<void()> work) {
+  std::lock_guard lock(mutex_);
+  if (stopping_ || posted_ >= kMaxPosted) return false;
+  ++posted_;
+  ready_.push_back({nullptr, std::move(work)});
+  changed_.notify_one();
+  return true;
+}
+
+void Scheduler::run_posted() {
+  std::vector<Job> jobs;
+  {
+    std::lock_guard lock(mutex_);
+    for (auto& job : ready_) {
+      if (job.work) jobs.push_back(std::move(job));
+    }
+    std::erase_if(ready_, [](const Job& job) { return !job.task; });
+    posted_ = 0;
+  }
+  for (const auto& job : jobs) job.work();
+}
+
+void Scheduler::stop() {
+  {
+    std::lock_guard lock(mutex_);
+    stopping_ = true;
+    changed_.notify_all();
+  }
+  threads_.clear();  // joins
+  std::lock_guard lock(mutex_);
+  ready_.clear();
+  waiting_.clear();
+}
+
+void Scheduler::work() {
+  std::unique_lock lock(mutex_);
+  while (!stopping_) {
+    queue_due();
+    if (!ready_.empty()) {
+      Job job = std::move(ready_.front());
+      ready_.pop_front();
+      run(lock, std::move(job));
+    } else if (waiting_.empty()) {
+      changed_.wait(lock);
+    } else {
+      changed_.wait_until(lock, Clock::time_point(waiting_.begin()->first));
+    }
+  }
+}
+
+// Precondition: the task is in no queue.
+void Scheduler::queue(std::shared_ptr<Task> task) {
+  task->phase_ = Task::Phase::kQueued;
+  ready_.push_back({std::move(task), nullptr});
+  changed_.notify_one();
+}
+
+void Scheduler::queue_due() {
+  const auto now = Clock::now();
+  while (!waiting_.empty() && waiting_.begin()->first <= now) {
+    auto entry = waiting_.extract(waiting_.begin());
+    queue(std::move(entry.mapped()));
+  }
+}
+
+void Scheduler::run(std::unique_lock<std::mutex>& lock, Job job) {
+  if (job.work) {
+    --posted_;
+    lock.unlock();
+    job.work();
+    job.work = nullptr;  // what it holds is destroyed outside the lock
+    lock.lock();
+    return;
+  }
+  job.task->phase_ = Task::Phase::kRunning;
+  lock.unlock();
+  const auto due = job.task->run_slice();
+  lock.lock();
+
+  if (job.task->phase_ == Task::Phase::kRunningAndWoken || (due && *due <= Clock::now())) {
+    queue(std::move(job.task));
+  } else if (due) {
+    job.task->phase_ = Task::Phase::kWaiting;
+    waiting_.emplace(*due, std::move(job.task));
+    changed_.notify_one();  // the next due time may be an earlier one now
+  } else {
+    job.task->phase_ = Task::Phase::kIdle;
+    lock.unlock();
+    job.task.reset();  // perhaps the last reference
+    lock.lock();
+  }
+}
+
+}  // namespace weft

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+namespace weft {
+
+using Clock = std::chrono::steady_clock;
+
+// Work done in slices. One thread at a time runs a task.
+class Task {
+ public:
+  virtual ~Task() = default;
+
+  // Does a little, and says when to go on; nullopt: not before the next wake().
+  virtual std::optional<Clock::time_point> run_slice() = 0;
+
+ private:
+  friend class Scheduler;
+  enum class Phase { kIdle, kWaiting, kQueued, kRunning, kRunningAndWoken };
+  Phase phase_ = Phase::kIdle;  // guarded by the scheduler
+};
+
+// A pool of threads. Runnable tasks take turns, one slice each, first come first served; tasks that
+// wait for a time join when it has come; idle ones cost nothing. All methods are thread-safe.
+class Scheduler {
+ public:
+  static constexpr std::size_t kMaxPosted = 1024;
+
+  explicit Scheduler(int threads);
+  ~Scheduler();  // stops
+
+  // Lets the task run a slice soon, after the one it is in, if any.
+  void wake(const std::shared_ptr<Task>& task);
+
+  // Runs `work` once, in its turn. False, and nothing done, when kMaxPosted already wait.
+  [[nodiscard]] bool post(std::function<void()> work);
+
+  // Runs everything posted that no thread has begun, here and now.
+  void run_posted();
+
+  // Lets each thread finish its slice, and drops the rest.
+  void stop();
+
+ private:
+  struct Job {  // one of the two
+    std::shared_ptr<Task> task;
+    std::function<void()> work;
+  };
+
+  void work();
+  void queue(std::shared_ptr<Task> task);
+  void queue_due();
+  void run(std::unique_lock<std::mutex>& lock, Job job);
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Job> ready_;
+  std::size_t posted_ = 0;                                             // jobs in ready_ with work
+  std::multimap<Clock::time_point, std::shared_ptr<Task>> waiting_;    // by due time
+  bool stopping_ = false;
+  std::vector<std::jthread> threads_;
+};
+
+}  // namespace weft

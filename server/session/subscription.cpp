@@ -1,0 +1,80 @@
+#include "server/session/subscription.h"
+
+#include <utility>
+
+#include "server/session/session.h"
+
+namespace weft {
+
+Subscription::Subscription(std::shared_ptr<Session> session, std::weak_ptr<FrameSink> sink,
+                           std::int64_t next, SlowReader policy)
+    : session_(std::move(session)), sink_(std::move(sink)), next_(next), policy_(policy) {}
+
+Subscription::~Subscription() { session_->unsubscribe(*this); }
+
+Reading Subscription::read() { return session_->read(*this); }
+
+std::unique_ptr<Subscription> Session::subscribe(std::weak_ptr<FrameSink> sink,
+                                                 std::optional<std::int64_t> start,
+                                                 SlowReader policy) {
+  std::lock_guard lock(mutex_);
+  auto subscription = std::make_unique<Subscription>(shared_from_this(), std::move(sink),
+                                                     start.value_or(latest()), policy);
+  subscriptions_.push_back(subscription.get());
+  return subscription;
+}
+
+void Session::unsubscribe(const Subscription& subscription) {
+  {
+    std::lock_guard lock(mutex_);
+    std::erase(subscriptions_, &subscription);
+    if (!release()) return;
+  }
+  wake();
+}
+
+Reading Session::read(Subscription& subscription) {
+  Reading reading;
+  {
+    std::lock_guard lock(mutex_);
+    reading.progress = progress();
+    reading.frame = history_.find(subscription.next_);
+    if (closed_ == Refusal::Why::kDeleted) {
+      reading.kind = Reading::Kind::kDeleted;
+    } else if (reading.frame) {
+      reading.kind = Reading::Kind::kFrame;
+      ++subscription.next_;
+    } else if (subscription.next_ < history_.oldest()) {
+      reading.kind = Reading::Kind::kExpired;
+    } else if (state_ == SessionState::kFailed) {
+      reading.kind = Reading::Kind::kFailed;
+    }
+    if (!reading.frame || !release()) return reading;
+  }
+  wake();
+  return reading;
+}
+
+// Ends the wait for subscribers. The pace begins anew: time lost is not made up for in a rush.
+bool Session::release() {
+  if (!held_) return false;
+  held_ = false;
+  if (run_) {
+    run_->start_time = Clock::now();
+    run_->start_frame = latest();
+  }
+  return true;
+}
+
+void Session::offer_to_all() {
+  std::vector<std::shared_ptr<FrameSink>> sinks;
+  {
+    std::lock_guard lock(mutex_);
+    for (const Subscription* subscription : subscriptions_) {
+      if (auto sink = subscription->sink_.lock()) sinks.push_back(std::move(sink));
+    }
+  }
+  for (const auto& sink : sinks) sink->offer();
+}
+
+}  // namespace weft

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "server/session/frame.h"
+
+namespace weft {
+
+class Session;
+
+enum class SessionState { kPaused, kRunning, kFailed };
+
+// What happens when a subscriber falls behind the frames that are kept: its subscription expires, or
+// the session waits for it.
+enum class SlowReader { kDisconnect, kHoldSession };
+
+// Someone who wants to know when there is something new. `offer` never blocks; it is called from any
+// thread with no lock held, and may be called for nothing.
+class FrameSink {
+ public:
+  virtual ~FrameSink() = default;
+  virtual void offer() = 0;
+};
+
+// Where a session stands.
+struct Progress {
+  std::int64_t oldest_frame = 0;
+  std::int64_t latest_frame = 0;
+  SessionState state = SessionState::kPaused;
+  bool at_rest = false;
+  std::uint64_t state_changes = 0;  // so far
+};
+
+// What a subscriber finds.
+struct Reading {
+  enum class Kind {
+    kFrame,
+    kNothingYet,
+    kExpired,  // the next frame is no longer kept
+    kFailed,   // there will be no next frame
+    kDeleted,
+  };
+  Kind kind = Kind::kNothingYet;
+  std::shared_ptr<const Frame> frame;  // of kFrame
+  Progress progress;
+};
+
+// A place in the frames of a session. Destroying it ends the subscription, and releases a session
+// that waits for it. Thread-safe.
+class Subscription {
+ public:
+  Subscription(std::shared_ptr<Session> session, std::weak_ptr<FrameSink> sink, std::int64_t next,
+               SlowReader policy);
+  ~Subscription();
+  Subscription(const Subscription&) = delete;
+  Subscription& operator=(const Subscription&) = delete;
+
+  // The next frame, each once and in order, or why there is none.
+  Reading read();
+
+ private:
+  friend class Session;
+  std::shared_ptr<Session> session_;
+  std::weak_ptr<FrameSink> sink_;
+  std::int64_t next_;  // frame; guarded by the session
+  SlowReader policy_;
+};
+
+}  // namespace weft

@@ -30,16 +30,16 @@ struct Refusal {
     kUnstable,     // see step
   };
   Why why;
-  std::int64_t frame = 0;         // newest frame
+  std::int64_t frame = 0;  // newest frame
   std::vector<Problem> problems;
   StepRefusal step;
 };
 
 // How a session stood when a command had been carried out.
 struct Applied {
-  std::int64_t frame = 0;             // first frame in which it shows
+  std::int64_t frame = 0;  // first frame in which it shows
   std::shared_ptr<const Frame> newest;
-  Textile textile;                    // of SetTextile
+  Textile textile;  // of SetTextile
   std::shared_ptr<const Plan> plan;
 };
 
@@ -72,8 +72,8 @@ struct PauseCommand {
 // What becomes of a textile, or why it cannot.
 using TextileEdit = std::function<std::variant<Textile, std::vector<Problem>>(const Textile&)>;
 
-// Changes the textile of a sheet. Precondition: the sheet exists; find_problems has nothing to say of
-// what `edit` answers.
+// Changes the textile of a sheet. Precondition: the sheet exists; find_problems has nothing to say
+// of what `edit` answers.
 struct SetTextile {
   std::size_t sheet = 0;
   TextileEdit edit;

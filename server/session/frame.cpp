@@ -4,7 +4,8 @@
 
 namespace weft {
 
-std::shared_ptr<const void> EncodingCache::get(int key, const std::function<Encoding()>& make) const {
+std::shared_ptr<const void> EncodingCache::get(int key,
+                                               const std::function<Encoding()>& make) const {
   std::lock_guard lock(mutex_);
   if (const auto found = encodings_.find(key); found != encodings_.end()) return found->second;
   Encoding made = make();

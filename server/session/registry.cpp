@@ -33,8 +33,8 @@ std::vector<std::shared_ptr<Session>> Registry::list(const std::string& after,
                                                      std::size_t count) const {
   std::lock_guard lock(mutex_);
   std::vector<std::shared_ptr<Session>> sessions;
-  for (auto next = sessions_.upper_bound(after);
-       next != sessions_.end() && sessions.size() < count; ++next) {
+  for (auto next = sessions_.upper_bound(after); next != sessions_.end() && sessions.size() < count;
+       ++next) {
     sessions.push_back(next->second);
   }
   return sessions;
@@ -45,17 +45,16 @@ std::size_t Registry::size() const {
   return sessions_.size();
 }
 
-bool Registry::erase(const std::string& id) {
+void Registry::erase(const std::string& id) {
   std::shared_ptr<Session> session;
   {
     std::lock_guard lock(mutex_);
     const auto found = sessions_.find(id);
-    if (found == sessions_.end()) return false;
+    if (found == sessions_.end()) return;
     session = std::move(found->second);
     sessions_.erase(found);
   }
   session->close(Refusal::Why::kDeleted);
-  return true;
 }
 
 void Registry::close(Refusal::Why why) {

@@ -29,8 +29,8 @@ class Registry {
   std::vector<std::shared_ptr<Session>> list(const std::string& after, std::size_t count) const;
   std::size_t size() const;
 
-  // Takes a session out and ends it. False where there is none.
-  bool erase(const std::string& id);
+  // Takes a session out and ends it, where there is one.
+  void erase(const std::string& id);
 
   // Ends every session, and adds none any more.
   void close(Refusal::Why why);

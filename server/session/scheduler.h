@@ -65,8 +65,8 @@ class Scheduler {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Job> ready_;
-  std::size_t posted_ = 0;                                             // jobs in ready_ with work
-  std::multimap<Clock::time_point, std::shared_ptr<Task>> waiting_;    // by due time
+  std::size_t posted_ = 0;                                           // jobs in ready_ with work
+  std::multimap<Clock::time_point, std::shared_ptr<Task>> waiting_;  // by due time
   bool stopping_ = false;
   std::vector<std::jthread> threads_;
 };

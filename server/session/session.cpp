@@ -127,7 +127,8 @@ void Session::execute(RunCommand command) {
     } else if (command.until_frame && *command.until_frame <= latest()) {
       outcome = refuse(Refusal::Why::kNotAhead);
     } else {
-      run_ = Run{command.time_scale, command.until_frame, command.until_rest, Clock::now(), latest()};
+      run_ =
+          Run{command.time_scale, command.until_frame, command.until_rest, Clock::now(), latest()};
       set_state(SessionState::kRunning);
       outcome = applied(latest() + 1);
     }

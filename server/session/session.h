@@ -27,8 +27,8 @@ struct SessionStatus {
   std::string failure;
 };
 
-// A simulation that advances on a scheduler. Calls reach it as commands that are carried out between
-// two frames; frames leave as shared, constant values. All public methods are thread-safe.
+// A simulation that advances on a scheduler. Calls reach it as commands that are carried out
+// between two frames; frames leave as shared, constant values. All public methods are thread-safe.
 class Session : public Task, public std::enable_shared_from_this<Session> {
  public:
   // Commands that may wait; more are refused (kBusy).
@@ -71,7 +71,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
     std::optional<double> time_scale;
     std::optional<std::int64_t> until_frame;
     bool until_rest = false;
-    Clock::time_point start_time;       // of the pace, when the frame was start_frame
+    Clock::time_point start_time;  // of the pace, when the frame was start_frame
     std::int64_t start_frame = 0;
   };
   using Answer = std::pair<Done, Outcome>;

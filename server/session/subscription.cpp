@@ -14,6 +14,16 @@ Subscription::~Subscription() { session_->unsubscribe(*this); }
 
 Reading Subscription::read() { return session_->read(*this); }
 
+std::int64_t Subscription::next_frame() const {
+  std::lock_guard lock(session_->mutex_);
+  return next_;
+}
+
+Progress Subscription::progress() const {
+  std::lock_guard lock(session_->mutex_);
+  return session_->progress();
+}
+
 std::unique_ptr<Subscription> Session::subscribe(std::weak_ptr<FrameSink> sink,
                                                  std::optional<std::int64_t> start,
                                                  SlowReader policy) {

@@ -11,12 +11,12 @@ class Session;
 
 enum class SessionState { kPaused, kRunning, kFailed };
 
-// What happens when a subscriber falls behind the frames that are kept: its subscription expires, or
-// the session waits for it.
+// What happens when a subscriber falls behind the frames that are kept: its subscription expires,
+// or the session waits for it.
 enum class SlowReader { kDisconnect, kHoldSession };
 
-// Someone who wants to know when there is something new. `offer` never blocks; it is called from any
-// thread with no lock held, and may be called for nothing.
+// Someone who wants to know when there is something new. `offer` never blocks; it is called from
+// any thread with no lock held, and may be called for nothing.
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
@@ -58,6 +58,9 @@ class Subscription {
 
   // The next frame, each once and in order, or why there is none.
   Reading read();
+
+  std::int64_t next_frame() const;
+  Progress progress() const;
 
  private:
   friend class Session;

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <google/protobuf/field_mask.pb.h>
+
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/simulation.h"
+#include "server/session/session.h"
+#include "weft/v1/session.pb.h"
+
+// Between the words of the interface (weft::v1) and those of the solver.
+namespace weft {
+
+// A value, or everything that is wrong with what it was to be made of.
+template <class T>
+using Converted = std::variant<T, std::vector<Problem>>;
+
+// A scene that can be simulated. Paths in problems begin with `field`.
+Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field);
+
+// A textile that can be simulated.
+Converted<Textile> to_textile(const v1::Textile& textile, const std::string& field);
+
+// `current` with the fields of `change` that the mask names; all of them without a mask.
+Converted<Textile> merge_textile(const Textile& current, const v1::Textile& change,
+                                 const google::protobuf::FieldMask& mask);
+
+enum class StartValues { kIncluded, kLeftOut };
+
+// With every default filled in.
+v1::Session to_proto(const Session& session, StartValues start_values = StartValues::kIncluded);
+v1::Textile to_proto(const Textile& textile);
+v1::Plan to_proto(const Plan& plan);
+v1::SessionState to_proto(SessionState state);
+
+}  // namespace weft

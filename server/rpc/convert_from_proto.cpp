@@ -1,0 +1,339 @@
+#include <google/protobuf/util/field_mask_util.h>
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <set>
+
+#include "server/rpc/convert.h"
+#include "server/textiles/catalogue.h"
+
+namespace weft {
+namespace {
+
+using google::protobuf::RepeatedPtrField;
+using google::protobuf::util::FieldMaskUtil;
+
+// Values by their number in the interface; 0 is the default.
+constexpr std::array kEvaluators = {Evaluator::kLinearized, Evaluator::kSeries, Evaluator::kExact,
+                                    Evaluator::kLinearized, Evaluator::kPolynomial};
+constexpr std::array kIntegrators = {IntegratorKind::kVerlet, IntegratorKind::kVerlet,
+                                     IntegratorKind::kEuler, IntegratorKind::kMidpoint,
+                                     IntegratorKind::kRk4};
+
+std::string at(const std::string& field, int index) {
+  return field + "[" + std::to_string(index) + "]";
+}
+
+// Vectors that are absent are 0 where the interface states no other default.
+Vector3d vector(const v1::Vector3& v) { return {v.x(), v.y(), v.z()}; }
+
+Path path(const RepeatedPtrField<v1::Keyframe>& keyframes) {
+  Path result;
+  for (const auto& key : keyframes) result.push_back({key.time_s(), vector(key.offset_m())});
+  return result;
+}
+
+template <class Message>
+Quaterniond rotation(const Message& message) {
+  if (!message.has_rotation()) return Quaterniond::Identity();
+  const auto& r = message.rotation();
+  return {r.w(), r.x(), r.y(), r.z()};
+}
+
+// "sheet", "sheet-2" ... by position, or the next one that is free.
+template <class Message>
+std::vector<std::string> names(const std::string& stem, const RepeatedPtrField<Message>& messages) {
+  std::set<std::string> taken;
+  for (const auto& message : messages) taken.insert(message.name());
+  std::vector<std::string> result;
+  for (const auto& message : messages) {
+    std::string name = message.name();
+    for (std::size_t n = result.size() + 1; name.empty(); ++n) {
+      const std::string free = n == 1 ? stem : stem + "-" + std::to_string(n);
+      if (taken.insert(free).second) name = free;
+    }
+    result.push_back(std::move(name));
+  }
+  return result;
+}
+
+// Reads messages, and collects what cannot be said in core's words. Paths are relative to the
+// scene.
+class Reader {
+ public:
+  Scene scene(const v1::Scene& from);
+  Textile textile(const v1::Textile& from, const std::string& field);
+
+  // What was found here, then core's problems, but none with a value that stands in for a missing
+  // one.
+  std::vector<Problem> with(const std::vector<Problem>& problems) &&;
+
+ private:
+  void problem(const std::string& field, const std::string& message) {
+    problems_.push_back({field, message});
+  }
+  void missing(const std::string& field, const std::string& choices, const std::string& stand_in) {
+    problem(field, "is absent; give " + choices);
+    stand_ins_.push_back(stand_in);
+  }
+
+  template <class Enum, std::size_t N>
+  Enum choice(const std::array<Enum, N>& values, int number, const std::string& field) {
+    if (number >= 0 && number < static_cast<int>(N))
+      return values[static_cast<std::size_t>(number)];
+    problem(field, std::to_string(number) + " is not within 0 to " + std::to_string(N - 1));
+    return values[0];
+  }
+
+  SheetDefinition sheet(const v1::Sheet& from, const std::string& field);
+  BendingLaw bending(const v1::BendingLaw& from, const std::string& field);
+  MeasuredTextile preset(const std::string& name, const std::string& field);
+  Collider collider(const v1::Collider& from, const std::string& field);
+  Environment environment(const v1::Environment& from);
+  SolverSettings solver(const v1::SolverSettings& from);
+
+  std::vector<Problem> problems_;
+  std::vector<std::string> stand_ins_;  // beginnings of paths
+};
+
+Scene Reader::scene(const v1::Scene& from) {
+  Scene scene;
+  const auto sheet_names = names("sheet", from.sheets());
+  for (int i = 0; i < from.sheets_size(); ++i) {
+    scene.sheets.push_back(sheet(from.sheets(i), at("sheets", i)));
+    scene.sheets.back().name = sheet_names[static_cast<std::size_t>(i)];
+  }
+  const auto collider_names = names("collider", from.colliders());
+  for (int i = 0; i < from.colliders_size(); ++i) {
+    scene.colliders.push_back(collider(from.colliders(i), at("colliders", i)));
+    scene.colliders.back().name = collider_names[static_cast<std::size_t>(i)];
+  }
+  scene.environment = environment(from.environment());
+  scene.solver = solver(from.solver());
+  return scene;
+}
+
+SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
+  SheetDefinition sheet;
+  sheet.grid = {from.grid().rows(), from.grid().columns(), from.grid().spacing_m()};
+  if (!from.has_grid()) missing(field + ".mesh", "grid", field + ".grid.");
+  if (from.has_textile()) {
+    sheet.textile = textile(from.textile(), field + ".textile");
+  } else {
+    missing(field + ".textile", "a textile", field + ".textile.");
+  }
+  if (from.has_bending()) sheet.bending = bending(from.bending(), field + ".bending");
+  sheet.origin = vector(from.placement().origin_m());
+  sheet.rotation = rotation(from.placement());
+  sheet.start_positions = {from.start_positions_m().begin(), from.start_positions_m().end()};
+  sheet.start_velocities = {from.start_velocities_m_per_s().begin(),
+                            from.start_velocities_m_per_s().end()};
+  for (const auto& pin : from.pins()) {
+    sheet.pins.push_back({{pin.particles().begin(), pin.particles().end()}, path(pin.path())});
+  }
+  if (from.has_skin_m()) sheet.skin = from.skin_m();
+  return sheet;
+}
+
+BendingLaw Reader::bending(const v1::BendingLaw& from, const std::string& field) {
+  if (from.has_isometric()) return Isometric{};
+  if (!from.has_choi_ko()) missing(field + ".law", "choi_ko or isometric", field + ".choi_ko.");
+  const auto& law = from.choi_ko();
+  ChoiKo choi_ko;
+  choi_ko.evaluator = choice(kEvaluators, law.evaluator(), field + ".choi_ko.evaluator");
+  if (law.has_segments()) choi_ko.segments = law.segments();
+  if (law.has_degree()) choi_ko.degree = law.degree();
+  choi_ko.fold_clamp = law.fold_clamp();
+  if (law.has_diagonal_bend()) choi_ko.diagonal_bend = law.diagonal_bend();
+  return choi_ko;
+}
+
+Textile Reader::textile(const v1::Textile& from, const std::string& field) {
+  Textile textile;
+  if (from.has_damping_kg_per_s()) textile.damping = from.damping_kg_per_s();
+  if (from.has_friction_coefficient()) textile.friction = from.friction_coefficient();
+  switch (from.model_case()) {
+    case v1::Textile::kPreset:
+      textile.model = preset(from.preset(), field);
+      break;
+    case v1::Textile::kMeasured: {
+      const auto& m = from.measured();
+      textile.model = MeasuredTextile{.areal_density = m.areal_density_kg_per_m2(),
+                                      .tensile_warp = m.tensile_warp_n_per_m(),
+                                      .tensile_weft = m.tensile_weft_n_per_m(),
+                                      .shear = m.shear_n_per_m(),
+                                      .bend_rigidity_warp = m.bend_rigidity_warp_n_m(),
+                                      .bend_rigidity_weft = m.bend_rigidity_weft_n_m(),
+                                      .air_drag = m.air_drag_kg_per_m2_s()};
+      break;
+    }
+    case v1::Textile::kRaw: {
+      const auto& r = from.raw();
+      RawTextile raw{.particle_mass = r.particle_mass_kg(),
+                     .stretch = r.stretch_n_per_m(),
+                     .shear = r.shear_n_per_m(),
+                     .bend = r.bend_n_m2(),
+                     .clamp = {},
+                     .air_drag = r.air_drag_kg_per_s()};
+      if (r.has_clamp_n_per_m()) raw.clamp = r.clamp_n_per_m();
+      textile.model = raw;
+      break;
+    }
+    case v1::Textile::MODEL_NOT_SET:
+      missing(field + ".model", "preset, measured or raw", field + ".measured.");
+      break;
+  }
+  return textile;
+}
+
+MeasuredTextile Reader::preset(const std::string& name, const std::string& field) {
+  const v1::TextilePreset* preset = find_preset(name);
+  if (preset != nullptr && preset->missing().empty()) {
+    v1::Textile values;
+    *values.mutable_measured() = preset->values();
+    return std::get<MeasuredTextile>(textile(values, field).model);
+  }
+  if (preset == nullptr) {
+    problem(field + ".preset", "there is no preset \"" + name + "\"; see ListTextiles");
+  } else {
+    std::string lacking;
+    for (const auto& value : preset->missing()) lacking += (lacking.empty() ? "" : ", ") + value;
+    problem(field + ".preset", "preset \"" + name + "\" is incomplete: no source gives " + lacking);
+  }
+  stand_ins_.push_back(field + ".measured.");
+  return {};
+}
+
+Collider Reader::collider(const v1::Collider& from, const std::string& field) {
+  Collider collider;
+  switch (from.shape_case()) {
+    case v1::Collider::kPlane: {
+      Plane plane{.point = vector(from.plane().point_m())};
+      if (from.plane().has_normal()) plane.normal = vector(from.plane().normal());
+      collider.shape = plane;
+      break;
+    }
+    case v1::Collider::kSphere:
+      collider.shape = Sphere{vector(from.sphere().center_m()), from.sphere().radius_m()};
+      break;
+    case v1::Collider::kBox: {
+      const auto& box = from.box();
+      collider.shape = Box{vector(box.center_m()), vector(box.half_size_m()), rotation(box)};
+      if (!box.has_half_size_m()) {
+        missing(field + ".box.half_size_m", "half of each edge", field + ".box.half_size_m.");
+      }
+      break;
+    }
+    case v1::Collider::kCapsule:
+      collider.shape = Capsule{vector(from.capsule().start_m()), vector(from.capsule().end_m()),
+                               from.capsule().radius_m()};
+      break;
+    case v1::Collider::SHAPE_NOT_SET:
+      problem(field + ".shape", "is absent; give plane, sphere, box or capsule");
+      break;
+  }
+  if (from.has_friction_coefficient()) collider.friction = from.friction_coefficient();
+  collider.path = path(from.path());
+  return collider;
+}
+
+Environment Reader::environment(const v1::Environment& from) {
+  Environment environment;
+  if (from.has_gravity_m_per_s2()) environment.gravity = vector(from.gravity_m_per_s2());
+  if (from.has_wind()) {
+    Wind& wind = environment.wind.emplace();
+    wind.velocity = vector(from.wind().velocity_m_per_s());
+    wind.gust = from.wind().gust();
+    if (from.wind().has_gust_period_s()) wind.gust_period = from.wind().gust_period_s();
+    if (from.wind().has_air_density_kg_per_m3()) {
+      wind.air_density = from.wind().air_density_kg_per_m3();
+    }
+    wind.tangential_drag = from.wind().tangential_drag_kg_per_m2_s();
+  }
+  return environment;
+}
+
+SolverSettings Reader::solver(const v1::SolverSettings& from) {
+  SolverSettings solver;
+  solver.integrator = choice(kIntegrators, from.integrator(), "solver.integrator");
+  if (from.has_frame_step_s()) solver.frame_step = from.frame_step_s();
+  if (from.has_substep_s()) solver.substep = from.substep_s();
+  solver.allow_unstable = from.allow_unstable();
+  if (from.has_safety()) solver.safety = from.safety();
+  return solver;
+}
+
+std::vector<Problem> Reader::with(const std::vector<Problem>& problems) && {
+  std::copy_if(
+      problems.begin(), problems.end(), std::back_inserter(problems_), [&](const Problem& problem) {
+        return std::none_of(stand_ins_.begin(), stand_ins_.end(), [&](const std::string& begin) {
+          return problem.field.starts_with(begin);
+        });
+      });
+  return std::move(problems_);
+}
+
+// Paths of a mask that cannot be followed from `current`.
+std::vector<Problem> mask_problems(const Textile& current, const v1::Textile& change,
+                                   const google::protobuf::FieldMask& mask) {
+  const bool raw = std::holds_alternative<RawTextile>(current.model);
+  std::vector<Problem> problems;
+  for (int i = 0; i < mask.paths_size(); ++i) {
+    const std::string& path = mask.paths(i);
+    const std::string field = at("update_mask.paths", i);
+    const std::string root = path.substr(0, path.find('.'));
+    const bool of_model = root == "raw" || root == "measured" || root == "preset";
+    if (!FieldMaskUtil::IsValidPath<v1::Textile>(path)) {
+      problems.push_back({field, "\"" + path + "\" is no field of weft.v1.Textile"});
+    } else if (of_model && raw != (root == "raw")) {
+      problems.push_back({field, "\"" + path + "\": the sheet has a " + (raw ? "raw" : "measured") +
+                                     " textile, and a mask does not change between the two"});
+    } else if (of_model && !change.GetReflection()->HasField(
+                               change, change.GetDescriptor()->FindFieldByName(root))) {
+      problems.push_back({"textile." + root, "is absent, but update_mask names \"" + path + "\""});
+    }
+  }
+  return problems;
+}
+
+// The textile as it was given: a clamp that follows from the stretch stays absent.
+v1::Textile as_given(const Textile& textile) {
+  v1::Textile given = to_proto(textile);
+  if (const auto* raw = std::get_if<RawTextile>(&textile.model); raw && !raw->clamp) {
+    given.mutable_raw()->clear_clamp_n_per_m();
+  }
+  return given;
+}
+
+}  // namespace
+
+Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field) {
+  Reader reader;
+  Scene read = reader.scene(scene);
+  auto problems = std::move(reader).with(find_problems(read));
+  if (problems.empty()) return read;
+  for (auto& problem : problems) problem.field = field + "." + problem.field;
+  return problems;
+}
+
+Converted<Textile> to_textile(const v1::Textile& textile, const std::string& field) {
+  Reader reader;
+  const Textile read = reader.textile(textile, field);
+  auto problems = std::move(reader).with(find_problems(read, field));
+  if (problems.empty()) return read;
+  return problems;
+}
+
+Converted<Textile> merge_textile(const Textile& current, const v1::Textile& change,
+                                 const google::protobuf::FieldMask& mask) {
+  if (mask.paths().empty()) return to_textile(change, "textile");
+  if (auto problems = mask_problems(current, change, mask); !problems.empty()) return problems;
+  v1::Textile merged = as_given(current);
+  FieldMaskUtil::MergeOptions options;
+  options.set_replace_message_fields(true);
+  FieldMaskUtil::MergeMessageTo(change, mask, options, &merged);
+  return to_textile(merged, "textile");
+}
+
+}  // namespace weft

@@ -1,0 +1,235 @@
+#include <google/protobuf/util/time_util.h>
+
+#include "server/rpc/convert.h"
+#include "server/rpc/names.h"
+
+namespace weft {
+namespace {
+
+using google::protobuf::RepeatedPtrField;
+
+void set(v1::Vector3* to, const Vector3d& from) {
+  to->set_x(from.x());
+  to->set_y(from.y());
+  to->set_z(from.z());
+}
+
+void set(v1::Rotation* to, const Quaterniond& from) {
+  to->set_w(from.w());
+  to->set_x(from.x());
+  to->set_y(from.y());
+  to->set_z(from.z());
+}
+
+void set(RepeatedPtrField<v1::Keyframe>* to, const Path& from) {
+  for (const auto& key : from) {
+    v1::Keyframe* added = to->Add();
+    added->set_time_s(key.time);
+    set(added->mutable_offset_m(), key.offset);
+  }
+}
+
+v1::Evaluator to_proto(Evaluator evaluator) {
+  switch (evaluator) {
+    case Evaluator::kSeries:
+      return v1::EVALUATOR_SERIES;
+    case Evaluator::kExact:
+      return v1::EVALUATOR_EXACT;
+    case Evaluator::kLinearized:
+      return v1::EVALUATOR_LINEARIZED;
+    case Evaluator::kPolynomial:
+      return v1::EVALUATOR_POLYNOMIAL;
+  }
+  return v1::EVALUATOR_UNSPECIFIED;
+}
+
+v1::Integrator to_proto(IntegratorKind integrator) {
+  switch (integrator) {
+    case IntegratorKind::kVerlet:
+      return v1::INTEGRATOR_VERLET;
+    case IntegratorKind::kEuler:
+      return v1::INTEGRATOR_EULER;
+    case IntegratorKind::kMidpoint:
+      return v1::INTEGRATOR_MIDPOINT;
+    case IntegratorKind::kRk4:
+      return v1::INTEGRATOR_RK4;
+  }
+  return v1::INTEGRATOR_UNSPECIFIED;
+}
+
+void set(v1::BendingLaw* to, const ChoiKo& from) {
+  v1::ChoiKo* law = to->mutable_choi_ko();
+  law->set_evaluator(to_proto(from.evaluator));
+  law->set_segments(from.segments);
+  law->set_degree(from.degree);
+  law->set_fold_clamp(from.fold_clamp);
+  law->set_diagonal_bend(from.diagonal_bend);
+}
+
+void set(v1::BendingLaw* to, const Isometric&) { to->mutable_isometric(); }
+
+void set(v1::Textile* to, const MeasuredTextile& from) {
+  v1::MeasuredTextile* measured = to->mutable_measured();
+  measured->set_areal_density_kg_per_m2(from.areal_density);
+  measured->set_tensile_warp_n_per_m(from.tensile_warp);
+  measured->set_tensile_weft_n_per_m(from.tensile_weft);
+  measured->set_shear_n_per_m(from.shear);
+  measured->set_bend_rigidity_warp_n_m(from.bend_rigidity_warp);
+  measured->set_bend_rigidity_weft_n_m(from.bend_rigidity_weft);
+  measured->set_air_drag_kg_per_m2_s(from.air_drag);
+}
+
+void set(v1::Textile* to, const RawTextile& from) {
+  v1::RawTextile* raw = to->mutable_raw();
+  raw->set_particle_mass_kg(from.particle_mass);
+  raw->set_stretch_n_per_m(from.stretch);
+  raw->set_shear_n_per_m(from.shear);
+  raw->set_bend_n_m2(from.bend);
+  raw->set_clamp_n_per_m(from.clamp.value_or(from.stretch));
+  raw->set_air_drag_kg_per_s(from.air_drag);
+}
+
+void set(v1::Sheet* to, const SheetDefinition& from, const Textile& textile,
+         StartValues start_values) {
+  to->set_name(from.name);
+  to->mutable_grid()->set_rows(from.grid.rows);
+  to->mutable_grid()->set_columns(from.grid.columns);
+  to->mutable_grid()->set_spacing_m(from.grid.spacing);
+  *to->mutable_textile() = to_proto(textile);
+  std::visit([&](const auto& law) { set(to->mutable_bending(), law); }, from.bending);
+  set(to->mutable_placement()->mutable_origin_m(), from.origin);
+  set(to->mutable_placement()->mutable_rotation(), from.rotation);
+  if (start_values == StartValues::kIncluded) {
+    to->mutable_start_positions_m()->Add(from.start_positions.begin(), from.start_positions.end());
+    to->mutable_start_velocities_m_per_s()->Add(from.start_velocities.begin(),
+                                                from.start_velocities.end());
+  }
+  for (const auto& pin : from.pins) {
+    v1::Pin* added = to->add_pins();
+    added->mutable_particles()->Add(pin.particles.begin(), pin.particles.end());
+    set(added->mutable_path(), pin.path);
+  }
+  to->set_skin_m(from.skin.value_or(from.grid.spacing / 10));
+}
+
+void set(v1::Collider* to, const Plane& plane) {
+  set(to->mutable_plane()->mutable_point_m(), plane.point);
+  set(to->mutable_plane()->mutable_normal(), plane.normal);
+}
+
+void set(v1::Collider* to, const Sphere& sphere) {
+  set(to->mutable_sphere()->mutable_center_m(), sphere.center);
+  to->mutable_sphere()->set_radius_m(sphere.radius);
+}
+
+void set(v1::Collider* to, const Box& box) {
+  set(to->mutable_box()->mutable_center_m(), box.center);
+  set(to->mutable_box()->mutable_half_size_m(), box.half_size);
+  set(to->mutable_box()->mutable_rotation(), box.rotation);
+}
+
+void set(v1::Collider* to, const Capsule& capsule) {
+  set(to->mutable_capsule()->mutable_start_m(), capsule.start);
+  set(to->mutable_capsule()->mutable_end_m(), capsule.end);
+  to->mutable_capsule()->set_radius_m(capsule.radius);
+}
+
+void set(v1::Environment* to, const Environment& from) {
+  set(to->mutable_gravity_m_per_s2(), from.gravity);
+  if (!from.wind) return;
+  v1::Wind* wind = to->mutable_wind();
+  set(wind->mutable_velocity_m_per_s(), from.wind->velocity);
+  wind->set_gust(from.wind->gust);
+  wind->set_gust_period_s(from.wind->gust_period);
+  wind->set_air_density_kg_per_m3(from.wind->air_density);
+  wind->set_tangential_drag_kg_per_m2_s(from.wind->tangential_drag);
+}
+
+void set(v1::SolverSettings* to, const SolverSettings& from) {
+  to->set_integrator(to_proto(from.integrator));
+  to->set_frame_step_s(from.frame_step);
+  if (from.substep) to->set_substep_s(*from.substep);
+  to->set_allow_unstable(from.allow_unstable);
+  to->set_safety(from.safety);
+}
+
+void set(v1::Scene* to, const Scene& from, const std::vector<Textile>& textiles,
+         StartValues start_values) {
+  for (std::size_t i = 0; i < from.sheets.size(); ++i) {
+    set(to->add_sheets(), from.sheets[i], textiles[i], start_values);
+  }
+  for (const auto& collider : from.colliders) {
+    v1::Collider* added = to->add_colliders();
+    added->set_name(collider.name);
+    std::visit([&](const auto& shape) { set(added, shape); }, collider.shape);
+    added->set_friction_coefficient(collider.friction);
+    set(added->mutable_path(), collider.path);
+  }
+  set(to->mutable_environment(), from.environment);
+  set(to->mutable_solver(), from.solver);
+}
+
+}  // namespace
+
+v1::Session to_proto(const Session& session, StartValues start_values) {
+  const SessionStatus status = session.status();
+  v1::Session result;
+  result.set_name(session_name(session.id()));
+  result.set_uid(session.uid());
+  set(result.mutable_scene(), session.scene(), status.textiles, start_values);
+  result.set_state(to_proto(status.state));
+  result.set_frame(status.newest->number);
+  result.set_time_s(status.newest->time);
+  result.set_at_rest(status.newest->at_rest);
+  *result.mutable_plan() = to_proto(*status.plan);
+  result.set_failure(status.failure);
+  const auto since_epoch = session.create_time().time_since_epoch();
+  *result.mutable_create_time() = google::protobuf::util::TimeUtil::NanosecondsToTimestamp(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count());
+  return result;
+}
+
+v1::Textile to_proto(const Textile& textile) {
+  v1::Textile result;
+  std::visit([&](const auto& model) { set(&result, model); }, textile.model);
+  result.set_damping_kg_per_s(textile.damping);
+  result.set_friction_coefficient(textile.friction);
+  return result;
+}
+
+v1::Plan to_proto(const Plan& plan) {
+  v1::Plan result;
+  result.set_substeps_per_frame(plan.step.substeps);
+  result.set_substep_s(plan.step.substep);
+  result.set_linear_bound_s(plan.step.linear_bound);
+  result.set_estimated_bound_s(plan.step.estimated_bound);
+  result.set_damping_ratio(plan.step.damping_ratio);
+  result.set_limiting_sheet(plan.step.limiting_sheet);
+  for (const auto& pass : plan.passes) result.add_passes(pass);
+  for (const auto& skipped : plan.skipped) {
+    v1::SkippedPass* added = result.add_skipped();
+    added->set_pass(skipped.pass);
+    added->set_reason(skipped.reason);
+  }
+  for (const auto& warning : plan.warnings) {
+    v1::Warning* added = result.add_warnings();
+    added->set_code(warning.code);
+    added->set_field(warning.field);
+    added->set_message(warning.message);
+  }
+  return result;
+}
+
+v1::SessionState to_proto(SessionState state) {
+  switch (state) {
+    case SessionState::kPaused:
+      return v1::SESSION_STATE_PAUSED;
+    case SessionState::kRunning:
+      return v1::SESSION_STATE_RUNNING;
+    case SessionState::kFailed:
+      return v1::SESSION_STATE_FAILED;
+  }
+  return v1::SESSION_STATE_UNSPECIFIED;
+}
+
+}  // namespace weft

@@ -1,0 +1,117 @@
+#include <new>
+#include <utility>
+
+#include "server/rpc/convert.h"
+#include "server/rpc/errors.h"
+#include "server/rpc/names.h"
+#include "server/rpc/session_service.h"
+
+namespace weft {
+namespace {
+
+std::int64_t particles_of(const Scene& scene) {
+  std::int64_t particles = 0;
+  for (const auto& sheet : scene.sheets) {
+    particles += std::int64_t{sheet.grid.rows} * sheet.grid.columns;
+  }
+  return particles;
+}
+
+grpc::Status refused_step(const Simulation& simulation, const StepRefusal& refusal) {
+  const std::string solver = "session.scene.solver.";
+  if (refusal.too_many_substeps) {
+    return errors::field_invalid(
+        solver + "frame_step_s",
+        "a frame would need " + std::to_string(simulation.plan().step.substeps) +
+            " substeps; at most " + std::to_string(kMaxSubsteps) + " are computed");
+  }
+  const bool asked = simulation.scene().solver.substep.has_value();
+  return errors::step_unstable(refusal, solver + (asked ? "substep_s" : "integrator"));
+}
+
+grpc::Status refused(Registry::Refused refused, const std::string& id, const Limits& limits) {
+  switch (refused) {
+    case Registry::Refused::kExists:
+      return errors::session_exists(session_name(id));
+    case Registry::Refused::kFull:
+      return errors::exhausted(
+          "sessions",
+          "the server holds " + std::to_string(limits.max_sessions) + " sessions, its most", true);
+    case Registry::Refused::kClosed:
+      break;
+  }
+  return errors::server_draining();
+}
+
+}  // namespace
+
+// Planning a scene takes its time: not on a thread of gRPC's.
+grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
+                                                        const v1::CreateSessionRequest* request,
+                                                        v1::Session* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const bool posted = backend_.scheduler.post([this, context, request, response, reactor] {
+    try {
+      reactor->Finish(context->IsCancelled() ? errors::cancelled() : create(*request, *response));
+    } catch (const std::bad_alloc&) {
+      reactor->Finish(errors::exhausted("memory", "the server has no memory for this scene", true));
+    }
+  });
+  if (!posted) {
+    reactor->Finish(errors::exhausted("creations", "too many sessions are being created", true));
+  }
+  return reactor;
+}
+
+grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
+                                    v1::Session& response) {
+  if (backend_.draining) return errors::server_draining();
+  if (!request.session_id().empty() && !is_session_id(request.session_id())) {
+    return errors::field_invalid("session_id", "\"" + request.session_id() +
+                                                   "\" is not 1 to 63 characters of a-z, 0-9 and "
+                                                   "-, beginning with a letter");
+  }
+  if (!request.session().has_scene()) {
+    return errors::field_invalid("session.scene", "is absent");
+  }
+
+  // everything that is wrong with the scene, and its size, before anything is made of it
+  auto converted = to_scene(request.session().scene(), "session.scene");
+  if (const auto* problems = std::get_if<std::vector<Problem>>(&converted)) {
+    return errors::field_invalid(*problems);
+  }
+  Scene& scene = std::get<Scene>(converted);
+  const std::int64_t particles = particles_of(scene);
+  if (particles > backend_.limits.max_particles_per_session) {
+    return errors::exhausted("particles",
+                             "the scene has " + std::to_string(particles) +
+                                 " particles; a session may have " +
+                                 std::to_string(backend_.limits.max_particles_per_session),
+                             false);
+  }
+  const std::string id = request.session_id().empty() ? make_session_id() : request.session_id();
+  if (!request.validate_only()) {
+    if (const auto reason = backend_.registry.refusal(id)) {
+      return refused(*reason, id, backend_.limits);
+    }
+  }
+
+  Simulation simulation(std::move(scene));
+  if (const auto refusal = simulation.refusal()) return refused_step(simulation, *refusal);
+  const auto session = std::make_shared<Session>(
+      id, std::move(simulation),
+      static_cast<std::size_t>(backend_.limits.history_bytes_per_session), backend_.scheduler);
+  response = to_proto(*session);
+  if (request.validate_only()) {
+    response.clear_name();
+    response.clear_uid();
+    response.clear_create_time();
+    return grpc::Status::OK;
+  }
+  if (const auto reason = backend_.registry.add(session)) {
+    return refused(*reason, id, backend_.limits);
+  }
+  return grpc::Status::OK;
+}
+
+}  // namespace weft

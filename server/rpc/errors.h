@@ -1,0 +1,45 @@
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/simulation.h"
+#include "server/session/subscription.h"
+
+// Every error of the service in one place: code, reason, details. Each carries google.rpc.ErrorInfo
+// with domain "weft.v1"; details stay below 4 KB, since larger ones destroy the whole answer.
+namespace weft::errors {
+
+using Metadata = std::map<std::string, std::string>;
+
+// At most 20 problems are listed; the message says how many there were.
+grpc::Status field_invalid(const std::vector<Problem>& problems);
+grpc::Status field_invalid(const std::string& field, const std::string& message);
+
+// `field` is to blame for the step.
+grpc::Status step_unstable(const StepRefusal& step, const std::string& field);
+
+grpc::Status message_malformed(const std::string& type);
+
+grpc::Status session_not_found(const std::string& name);
+grpc::Status session_exists(const std::string& name);
+grpc::Status textile_not_found(const std::string& name);
+
+grpc::Status failed_precondition(const std::string& reason, const std::string& message,
+                                 const Metadata& metadata = {});
+grpc::Status aborted(const std::string& reason, const std::string& message,
+                     const Metadata& metadata);
+grpc::Status cancelled();
+
+grpc::Status frame_expired(std::int64_t wanted, const Progress& progress);
+grpc::Status solver_failed(const std::string& failure, std::int64_t latest_frame);
+
+// Something the server has only so much of. `subject` names it, such as "sessions".
+grpc::Status exhausted(const std::string& subject, const std::string& message, bool retry);
+
+grpc::Status server_draining(const Metadata& metadata = {});
+
+}  // namespace weft::errors

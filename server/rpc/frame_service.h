@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+
+#include "server/rpc/frame_stream.h"
+#include "server/rpc/frame_streams.h"
+#include "weft/v1/frame.grpc.pb.h"
+
+namespace weft {
+
+// Requests and frames pass as bytes: frames are encoded once for all streams.
+class FrameService final
+    : public v1::FrameService::WithRawCallbackMethod_StreamFrames<v1::FrameService::Service> {
+ public:
+  explicit FrameService(Backend& backend)
+      : backend_(backend), streams_(static_cast<std::size_t>(backend.limits.max_streams)) {}
+
+  void drain() { streams_.drain(); }
+
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* StreamFrames(
+      grpc::CallbackServerContext*, const grpc::ByteBuffer* request) override {
+    const auto stream = std::make_shared<FrameStream>(backend_, streams_);
+    stream->start(*request);
+    return stream.get();
+  }
+
+ private:
+  Backend& backend_;
+  FrameStreams streams_;
+};
+
+}  // namespace weft

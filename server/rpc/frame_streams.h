@@ -1,0 +1,45 @@
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <thread>
+
+namespace weft {
+
+class FrameStream;
+
+// The open streams, at most `max_streams`. A thread of its own reminds them of Progress.
+class FrameStreams {
+ public:
+  // With kTick later a reader hears something every two seconds.
+  static constexpr std::chrono::milliseconds kTick{250};
+  static constexpr std::chrono::milliseconds kProgressInterval{1750};
+
+  explicit FrameStreams(std::size_t max_streams);
+  ~FrameStreams();
+
+  // Why the stream is not one of them.
+  grpc::Status add(std::shared_ptr<FrameStream> stream);
+  void remove(const std::shared_ptr<FrameStream>& stream);
+
+  // Ends every stream, and adds none any more.
+  void drain();
+
+ private:
+  void remind(const std::stop_token& stop);
+
+  const std::size_t max_streams_;
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::set<std::shared_ptr<FrameStream>> streams_;
+  bool draining_ = false;
+  std::jthread thread_;
+};
+
+}  // namespace weft

@@ -1,0 +1,43 @@
+#include "server/rpc/names.h"
+
+#include <algorithm>
+#include <random>
+
+#include "server/rpc/errors.h"
+
+namespace weft {
+namespace {
+
+constexpr std::string_view kCollection = "sessions/";
+
+}  // namespace
+
+std::string session_name(const std::string& id) { return std::string(kCollection) + id; }
+
+bool is_session_id(const std::string& id) {
+  const auto letter = [](char c) { return c >= 'a' && c <= 'z'; };
+  return !id.empty() && id.size() <= 63 && letter(id.front()) &&
+         std::all_of(id.begin(), id.end(),
+                     [&](char c) { return letter(c) || (c >= '0' && c <= '9') || c == '-'; });
+}
+
+std::string make_session_id() {
+  std::random_device random;
+  std::string id = "session-";
+  for (int i = 0; i < 10; ++i) id += "0123456789abcdefghijklmnopqrstuvwxyz"[random() % 36];
+  return id;
+}
+
+FoundSession find_session(const Registry& registry, const std::string& name,
+                          const std::string& field) {
+  const std::string id = name.starts_with(kCollection) ? name.substr(kCollection.size()) : "";
+  if (!is_session_id(id)) {
+    return errors::field_invalid(field, "\"" + name +
+                                            "\" is not sessions/ and 1 to 63 characters of a-z, "
+                                            "0-9 and -, beginning with a letter");
+  }
+  if (auto session = registry.find(id)) return session;
+  return errors::session_not_found(name);
+}
+
+}  // namespace weft

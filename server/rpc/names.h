@@ -1,0 +1,28 @@
+#pragma once
+
+#include <grpcpp/support/status.h>
+
+#include <memory>
+#include <string>
+#include <variant>
+
+#include "server/session/registry.h"
+
+// Resource names: "sessions/{session}".
+namespace weft {
+
+std::string session_name(const std::string& id);
+
+// 1 to 63 characters of [a-z0-9-], beginning with a letter.
+bool is_session_id(const std::string& id);
+
+// An id that nobody will guess to be taken.
+std::string make_session_id();
+
+using FoundSession = std::variant<std::shared_ptr<Session>, grpc::Status>;
+
+// The session called `name`, or why there is none; `field` is where the request names it.
+FoundSession find_session(const Registry& registry, const std::string& name,
+                          const std::string& field = "name");
+
+}  // namespace weft

@@ -1,0 +1,24 @@
+#include "server/rpc/server_service.h"
+
+namespace weft {
+
+grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerContext* context,
+                                                       const v1::GetServerInfoRequest*,
+                                                       v1::ServerInfo* response) {
+  response->set_version(WEFT_VERSION);
+  response->set_numerics_id(kNumericsId);
+  response->set_worker_threads(backend_.worker_threads);
+  response->set_sessions(static_cast<std::int64_t>(backend_.registry.size()));
+  v1::Limits* limits = response->mutable_limits();
+  limits->set_max_sessions(backend_.limits.max_sessions);
+  limits->set_max_particles_per_session(backend_.limits.max_particles_per_session);
+  limits->set_history_bytes_per_session(backend_.limits.history_bytes_per_session);
+  limits->set_max_streams(backend_.limits.max_streams);
+  limits->set_max_request_bytes(backend_.limits.max_request_bytes);
+  limits->set_max_frame_bytes(backend_.limits.max_frame_bytes);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(grpc::Status::OK);
+  return reactor;
+}
+
+}  // namespace weft

@@ -1,0 +1,23 @@
+#pragma once
+
+#include "server/rpc/backend.h"
+#include "weft/v1/server.grpc.pb.h"
+
+namespace weft {
+
+// Frames of servers with equal ids are equal to the bit.
+inline constexpr const char* kNumericsId = "weft-" WEFT_VERSION "-double";
+
+class ServerService final : public v1::ServerService::CallbackService {
+ public:
+  explicit ServerService(const Backend& backend) : backend_(backend) {}
+
+  grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context,
+                                          const v1::GetServerInfoRequest* request,
+                                          v1::ServerInfo* response) override;
+
+ private:
+  const Backend& backend_;
+};
+
+}  // namespace weft

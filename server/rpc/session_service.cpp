@@ -1,0 +1,251 @@
+#include "server/rpc/session_service.h"
+
+#include <stop_token>
+#include <utility>
+
+#include "server/rpc/convert.h"
+#include "server/rpc/errors.h"
+#include "server/rpc/names.h"
+
+namespace weft {
+namespace {
+
+grpc::ServerUnaryReactor* answer(grpc::CallbackServerContext* context, const grpc::Status& status) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(status);
+  return reactor;
+}
+
+grpc::Status to_status(const Refusal& refusal, const Session& session) {
+  const std::string name = session_name(session.id());
+  const std::string frame = std::to_string(refusal.frame);
+  const errors::Metadata latest = {{"latest_frame", frame}};
+  switch (refusal.why) {
+    case Refusal::Why::kDeleted:
+      return errors::session_not_found(name);
+    case Refusal::Why::kDraining:
+      return errors::server_draining({{"last_frame", frame}});
+    case Refusal::Why::kBusy:
+      return errors::exhausted("commands", "too many calls wait for " + name, true);
+    case Refusal::Why::kRunning:
+      return errors::failed_precondition(
+          "SESSION_RUNNING", name + " runs by itself; pause it before stepping", latest);
+    case Refusal::Why::kFailed:
+      return errors::solver_failed(session.status().failure, refusal.frame);
+    case Refusal::Why::kStale:
+      return errors::aborted("FRAME_STALE", "expected_frame is not the newest frame, " + frame,
+                             latest);
+    case Refusal::Why::kNotAhead:
+      return errors::field_invalid("until_frame",
+                                   "does not lie ahead of the newest frame, " + frame);
+    case Refusal::Why::kInterrupted:
+      return errors::aborted("STEP_INTERRUPTED", name + " was paused after frame " + frame, latest);
+    case Refusal::Why::kCancelled:
+      return errors::cancelled();
+    case Refusal::Why::kInvalid:
+      return errors::field_invalid(refusal.problems);
+    case Refusal::Why::kUnstable:
+      break;
+  }
+  if (!refusal.step.too_many_substeps) return errors::step_unstable(refusal.step, "textile");
+  return errors::field_invalid("textile", "a frame would need more than " +
+                                              std::to_string(kMaxSubsteps) +
+                                              " substeps, the most that are computed");
+}
+
+// Finishes `reactor` with what becomes of a command; `fill` writes the response.
+template <class Fill>
+Done finish_with(grpc::ServerUnaryReactor* reactor, std::shared_ptr<Session> session, Fill fill) {
+  return [reactor, session = std::move(session), fill](const Outcome& outcome) {
+    if (const auto* refusal = std::get_if<Refusal>(&outcome)) {
+      reactor->Finish(to_status(*refusal, *session));
+    } else {
+      fill(std::get<Applied>(outcome));
+      reactor->Finish(grpc::Status::OK);
+    }
+  };
+}
+
+template <class Fill>
+grpc::ServerUnaryReactor* submit(grpc::CallbackServerContext* context,
+                                 const std::shared_ptr<Session>& session, auto command, Fill fill) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  command.done = finish_with(reactor, session, fill);
+  session->submit(std::move(command));
+  return reactor;
+}
+
+// A step that ends with its caller.
+class StepCall final : public grpc::ServerUnaryReactor {
+ public:
+  explicit StepCall(std::shared_ptr<Session> session) : session_(std::move(session)) {}
+
+  std::stop_token cancelled() const { return source_.get_token(); }
+
+  void OnCancel() override {
+    source_.request_stop();
+    session_->wake();
+  }
+  void OnDone() override { delete this; }
+
+ private:
+  std::stop_source source_;
+  std::shared_ptr<Session> session_;
+};
+
+// Index of the sheet, or why there is none.
+std::variant<std::size_t, grpc::Status> find_sheet(const Scene& scene, const std::string& name) {
+  if (name.empty() && scene.sheets.size() == 1) return std::size_t{0};
+  for (std::size_t i = 0; i < scene.sheets.size(); ++i) {
+    if (scene.sheets[i].name == name) return i;
+  }
+  std::string names;
+  for (const auto& sheet : scene.sheets) names += (names.empty() ? "" : ", ") + sheet.name;
+  return errors::field_invalid("sheet", "\"" + name + "\" is none of the sheets: " + names);
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
+                                                     const v1::GetSessionRequest* request,
+                                                     v1::Session* response) {
+  return answer(context, get(*request, *response));
+}
+
+grpc::Status SessionService::get(const v1::GetSessionRequest& request,
+                                 v1::Session& response) const {
+  const auto found = find_session(backend_.registry, request.name());
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
+  response = to_proto(*std::get<std::shared_ptr<Session>>(found));
+  return grpc::Status::OK;
+}
+
+grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerContext* context,
+                                                       const v1::ListSessionsRequest* request,
+                                                       v1::ListSessionsResponse* response) {
+  return answer(context, list(*request, *response));
+}
+
+grpc::Status SessionService::list(const v1::ListSessionsRequest& request,
+                                  v1::ListSessionsResponse& response) const {
+  constexpr int kMost = 1000, kDefault = 100;
+  if (request.page_size() < 0 || request.page_size() > kMost) {
+    return errors::field_invalid("page_size",
+                                 std::to_string(request.page_size()) + " is not within 0 to 1000");
+  }
+  if (!request.page_token().empty() && !is_session_id(request.page_token())) {
+    return errors::field_invalid("page_token", "is none that this server gave");
+  }
+  const int size = request.page_size() == 0 ? kDefault : request.page_size();
+  const auto sessions =
+      backend_.registry.list(request.page_token(), static_cast<std::size_t>(size) + 1);
+  for (const auto& session : sessions) {
+    if (response.sessions_size() == size) {  // the one too many tells that there is a next page
+      response.set_next_page_token(sessions[sessions.size() - 2]->id());
+      break;
+    }
+    *response.add_sessions() = to_proto(*session, StartValues::kLeftOut);
+  }
+  return grpc::Status::OK;
+}
+
+grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
+                                                        const v1::DeleteSessionRequest* request,
+                                                        v1::DeleteSessionResponse*) {
+  return answer(context, erase(*request));
+}
+
+grpc::Status SessionService::erase(const v1::DeleteSessionRequest& request) {
+  if (backend_.draining) return errors::server_draining();
+  const auto found = find_session(backend_.registry, request.name());
+  if (const auto* session = std::get_if<std::shared_ptr<Session>>(&found)) {
+    backend_.registry.erase((*session)->id());
+    return grpc::Status::OK;
+  }
+  const auto& error = std::get<grpc::Status>(found);
+  const bool missing = error.error_code() == grpc::StatusCode::NOT_FOUND;
+  return missing && request.allow_missing() ? grpc::Status::OK : error;
+}
+
+grpc::ServerUnaryReactor* SessionService::UpdateTextile(grpc::CallbackServerContext* context,
+                                                        const v1::UpdateTextileRequest* request,
+                                                        v1::UpdateTextileResponse* response) {
+  const auto found = find_session(backend_.registry, request->name());
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
+  const auto& session = std::get<std::shared_ptr<Session>>(found);
+  const auto sheet = find_sheet(session->scene(), request->sheet());
+  if (const auto* error = std::get_if<grpc::Status>(&sheet)) return answer(context, *error);
+  if (!request->has_textile())
+    return answer(context, errors::field_invalid("textile", "is absent"));
+
+  SetTextile command;
+  command.sheet = std::get<std::size_t>(sheet);
+  command.edit =
+      [request](const Textile& current) {  // the request lives until the call is finished
+        return merge_textile(current, request->textile(), request->update_mask());
+      };
+  return submit(context, session, std::move(command), [response](const Applied& applied) {
+    response->set_applied_frame(applied.frame);
+    *response->mutable_textile() = to_proto(applied.textile);
+    *response->mutable_plan() = to_proto(*applied.plan);
+  });
+}
+
+grpc::ServerUnaryReactor* SessionService::StepSession(grpc::CallbackServerContext* context,
+                                                      const v1::StepSessionRequest* request,
+                                                      v1::StepSessionResponse* response) {
+  constexpr std::int64_t kMostFrames = 100'000;
+  const auto found = find_session(backend_.registry, request->name());
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
+  const auto& session = std::get<std::shared_ptr<Session>>(found);
+  StepCommand command;
+  if (request->has_frames()) command.frames = request->frames();
+  if (command.frames < 1 || command.frames > kMostFrames) {
+    return answer(context, errors::field_invalid("frames", std::to_string(command.frames) +
+                                                               " is not within 1 to 100000"));
+  }
+  if (request->has_expected_frame()) command.expected_frame = request->expected_frame();
+
+  auto* call = new StepCall(session);  // deletes itself in OnDone
+  command.cancelled = call->cancelled();
+  command.done = finish_with(call, session, [response](const Applied& applied) {
+    response->set_applied_frame(applied.frame);
+    response->set_frame(applied.newest->number);
+    response->set_time_s(applied.newest->time);
+    response->set_at_rest(applied.newest->at_rest);
+  });
+  session->submit(std::move(command));
+  return call;
+}
+
+grpc::ServerUnaryReactor* SessionService::RunSession(grpc::CallbackServerContext* context,
+                                                     const v1::RunSessionRequest* request,
+                                                     v1::RunSessionResponse* response) {
+  const auto found = find_session(backend_.registry, request->name());
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
+  RunCommand command;
+  if (request->has_time_scale()) {
+    const double scale = request->time_scale();
+    if (!(scale >= 1e-3 && scale <= 1000)) {  // NaN too
+      return answer(context,
+                    errors::field_invalid("time_scale",
+                                          std::to_string(scale) + " is not within 0.001 to 1000"));
+    }
+    command.time_scale = scale;
+  }
+  if (request->has_until_frame()) command.until_frame = request->until_frame();
+  command.until_rest = request->until_rest();
+  return submit(context, std::get<std::shared_ptr<Session>>(found), std::move(command),
+                [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
+}
+
+grpc::ServerUnaryReactor* SessionService::PauseSession(grpc::CallbackServerContext* context,
+                                                       const v1::PauseSessionRequest* request,
+                                                       v1::PauseSessionResponse* response) {
+  const auto found = find_session(backend_.registry, request->name());
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
+  return submit(context, std::get<std::shared_ptr<Session>>(found), PauseCommand{},
+                [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
+}
+
+}  // namespace weft

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string>
+
+#include "server/rpc/backend.h"
+#include "weft/v1/session.grpc.pb.h"
+
+namespace weft {
+
+class SessionService final : public v1::SessionService::CallbackService {
+ public:
+  explicit SessionService(Backend& backend) : backend_(backend) {}
+
+  grpc::ServerUnaryReactor* CreateSession(grpc::CallbackServerContext* context,
+                                          const v1::CreateSessionRequest* request,
+                                          v1::Session* response) override;
+  grpc::ServerUnaryReactor* GetSession(grpc::CallbackServerContext* context,
+                                       const v1::GetSessionRequest* request,
+                                       v1::Session* response) override;
+  grpc::ServerUnaryReactor* ListSessions(grpc::CallbackServerContext* context,
+                                         const v1::ListSessionsRequest* request,
+                                         v1::ListSessionsResponse* response) override;
+  grpc::ServerUnaryReactor* DeleteSession(grpc::CallbackServerContext* context,
+                                          const v1::DeleteSessionRequest* request,
+                                          v1::DeleteSessionResponse* response) override;
+  grpc::ServerUnaryReactor* UpdateTextile(grpc::CallbackServerContext* context,
+                                          const v1::UpdateTextileRequest* request,
+                                          v1::UpdateTextileResponse* response) override;
+  grpc::ServerUnaryReactor* StepSession(grpc::CallbackServerContext* context,
+                                        const v1::StepSessionRequest* request,
+                                        v1::StepSessionResponse* response) override;
+  grpc::ServerUnaryReactor* RunSession(grpc::CallbackServerContext* context,
+                                       const v1::RunSessionRequest* request,
+                                       v1::RunSessionResponse* response) override;
+  grpc::ServerUnaryReactor* PauseSession(grpc::CallbackServerContext* context,
+                                         const v1::PauseSessionRequest* request,
+                                         v1::PauseSessionResponse* response) override;
+
+ private:
+  grpc::Status create(const v1::CreateSessionRequest& request, v1::Session& response);
+  grpc::Status get(const v1::GetSessionRequest& request, v1::Session& response) const;
+  grpc::Status list(const v1::ListSessionsRequest& request,
+                    v1::ListSessionsResponse& response) const;
+  grpc::Status erase(const v1::DeleteSessionRequest& request);
+
+  Backend& backend_;
+};
+
+}  // namespace weft

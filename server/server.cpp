@@ -1,0 +1,99 @@
+#include "server/server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/health_check_service_interface.h>
+
+#include <array>
+#include <stdexcept>
+
+#include "server/rpc/backend.h"
+#include "server/rpc/frame_service.h"
+#include "server/rpc/server_service.h"
+#include "server/rpc/session_service.h"
+#include "server/rpc/textile_service.h"
+
+namespace weft {
+namespace {
+
+constexpr std::array kServices = {"", "weft.v1.SessionService", "weft.v1.FrameService",
+                                  "weft.v1.ServerService", "weft.v1.TextileService"};
+
+void set_transport(grpc::ServerBuilder& builder, const Limits& limits) {
+  using std::chrono::milliseconds, std::chrono::seconds;
+  const auto ms = [](milliseconds time) { return static_cast<int>(time.count()); };
+  builder.SetMaxReceiveMessageSize(static_cast<int>(limits.max_request_bytes));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, 1024);
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT,
+                             0);  // a second server does not share the port
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, ms(seconds(30)));
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, ms(seconds(10)));
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
+                             ms(seconds(10)));
+}
+
+void enable_plugins() {
+  static const bool once = [] {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+    return true;
+  }();
+  static_cast<void>(once);
+}
+
+}  // namespace
+
+struct Server::Parts {
+  explicit Parts(const ServerOptions& options) : backend(options.limits, options.worker_threads) {}
+
+  Backend backend;
+  SessionService sessions{backend};
+  FrameService frames{backend};
+  ServerService server{backend};
+  TextileService textiles;
+  std::unique_ptr<grpc::Server> grpc;
+  bool stopped = false;
+};
+
+Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(options)) {
+  enable_plugins();
+  grpc::ServerBuilder builder;
+  set_transport(builder, options.limits);
+  builder.RegisterService(&parts_->sessions);
+  builder.RegisterService(&parts_->frames);
+  builder.RegisterService(&parts_->server);
+  builder.RegisterService(&parts_->textiles);
+  int port = 0;
+  if (options.host) {
+    builder.AddListeningPort(*options.host + ":" + std::to_string(options.port),
+                             grpc::InsecureServerCredentials(), &port);
+  }
+  parts_->grpc = builder.BuildAndStart();
+  if (!parts_->grpc || (options.host && port == 0)) {
+    throw std::runtime_error("cannot listen on " + options.host.value_or("") + ":" +
+                             std::to_string(options.port) + ": is the port taken?");
+  }
+  if (options.host) address_ = *options.host + ":" + std::to_string(port);
+  for (const char* service : kServices) {
+    parts_->grpc->GetHealthCheckService()->SetServingStatus(service, true);
+  }
+}
+
+Server::~Server() { stop(); }
+
+std::shared_ptr<grpc::Channel> Server::in_process_channel() {
+  return parts_->grpc->InProcessChannel({});
+}
+
+void Server::stop(std::chrono::milliseconds deadline) {
+  if (!parts_->grpc || std::exchange(parts_->stopped, true)) return;
+  parts_->grpc->GetHealthCheckService()->Shutdown();  // NOT_SERVING
+  parts_->backend.draining = true;
+
+  // gRPC waits for every call for ever: end them all ourselves
+  parts_->frames.drain();
+  parts_->backend.registry.close(Refusal::Why::kDraining);
+  parts_->backend.scheduler.run_posted();
+  parts_->grpc->Shutdown(std::chrono::system_clock::now() + deadline);
+}
+
+}  // namespace weft

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "server/session/limits.h"
+
+namespace weft {
+
+struct ServerOptions {
+  std::optional<std::string> host = "127.0.0.1";  // absent: reached by in_process_channel() only
+  int port = 0;                                   // 0: a free one
+  int worker_threads = static_cast<int>(std::thread::hardware_concurrency());
+  Limits limits;
+};
+
+// A running textile service.
+class Server {
+ public:
+  // Serves once constructed. Throws std::runtime_error where the address cannot be had.
+  explicit Server(const ServerOptions& options);
+  ~Server();  // stops
+
+  const std::string& address() const { return address_; }  // "127.0.0.1:41234"; empty without host
+
+  // A channel without a network.
+  std::shared_ptr<grpc::Channel> in_process_channel();
+
+  // Reports NOT_SERVING, creates no session any more, ends every stream and waiting call with
+  // SERVER_DRAINING, and stops serving; calls still under way after `deadline` are cancelled.
+  // Frames being computed are finished by the destructor. Calling it again does nothing.
+  void stop(std::chrono::milliseconds deadline = std::chrono::seconds(2));
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+  std::string address_;
+};
+
+}  // namespace weft

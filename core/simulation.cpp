@@ -268,21 +268,30 @@ FrameStats Simulation::stats() const {
 std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Textile& textile) {
   State& state = *state_;
   SheetDefinition& definition = state.scene.sheets[index];
-  Sheet& sheet = state.sheets[index];
-  const Textile old_textile = std::exchange(definition.textile, textile);
-  set_textile_of(state.scene, definition, sheet);
+  if (definition.textile == textile) return std::nullopt;
+
   const double dt = state.plan.step.substep;
+  std::vector<Matrix3Xd> velocities(state.sheets.size());
+  for (std::size_t s = 0; s < state.sheets.size(); ++s)
+    state.integrator->closing_velocity(state.sheets[s].dynamics, state.time(), dt,
+                                       state.sheets[s].motion, velocities[s]);
+
+  const Textile old_textile = std::exchange(definition.textile, textile);
+  set_textile_of(state.scene, definition, state.sheets[index]);
   Plan plan = state.plan_now();
   if (const auto refused = refusal_of(plan.step, state.scene.solver.allow_unstable)) {
     definition.textile = old_textile;
-    set_textile_of(state.scene, definition, sheet);
+    set_textile_of(state.scene, definition, state.sheets[index]);
     return refused;
   }
   state.plan = std::move(plan);
-  if (state.plan.step.substep != dt)
-    for (Sheet& moved : state.sheets)
-      state.integrator->change_step(moved.dynamics, state.time(), dt, state.plan.step.substep,
-                                    moved.motion);
+
+  // sheets whose forces and step stay go on as they were
+  const double new_dt = state.plan.step.substep;
+  for (std::size_t s = 0; s < state.sheets.size(); ++s)
+    if (s == index || new_dt != dt)
+      state.integrator->start(state.sheets[s].dynamics, state.time(), new_dt, velocities[s],
+                              state.sheets[s].motion);
   state.frames_at_rest = 0;
   return std::nullopt;
 }

@@ -14,22 +14,28 @@ struct MeasuredTextile {
   double bend_rigidity_warp = 0;  // N m
   double bend_rigidity_weft = 0;  // N m
   double air_drag = 0;            // kg/(m^2 s)
+
+  bool operator==(const MeasuredTextile&) const = default;
 };
 
 // The paper's constants: one for every particle or connection of a mesh.
 struct RawTextile {
-  double particle_mass = 0;     // kg
-  double stretch = 0;           // k_s, N/m
-  double shear = 0;             // k_s of the diagonals, N/m
-  double bend = 0;              // k_b, N m^2
-  std::optional<double> clamp;  // c_b, N/m; absent: stretch
-  double air_drag = 0;          // kg/s
+  double particle_mass = 0;          // kg
+  double stretch = 0;                // k_s, N/m
+  double shear = 0;                  // k_s of the diagonals, N/m
+  double bend = 0;                   // k_b, N m^2
+  std::optional<double> clamp = {};  // c_b, N/m; absent: stretch
+  double air_drag = 0;               // kg/s
+
+  bool operator==(const RawTextile&) const = default;
 };
 
 struct Textile {
   std::variant<MeasuredTextile, RawTextile> model;
   double damping = 2e-4;  // k_d, kg/s
   double friction = 0.3;  // Coulomb coefficient
+
+  bool operator==(const Textile&) const = default;
 };
 
 }  // namespace weft

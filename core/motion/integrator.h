@@ -34,10 +34,11 @@ class Integrator {
                      Motion& motion) = 0;
   // Advances x, d and d_previous from `time` by dt.
   virtual void advance(const Dynamics& dynamics, double time, double dt, Motion& motion) = 0;
-  // Goes over from steps of dt to steps of new_dt at `time`.
-  virtual void change_step(const Dynamics& dynamics, double time, double dt, double new_dt,
-                           Motion& motion) = 0;
-  // Velocities of the present state, m/s.
+  // Velocities at `time` as the forces there complete them, m/s: what start() needs to go on with
+  // other forces or another dt without losing an order.
+  virtual void closing_velocity(const Dynamics& dynamics, double time, double dt,
+                                const Motion& motion, Matrix3Xd& v) = 0;
+  // Velocities of the present state without asking for forces, m/s.
   virtual void velocity(const Motion& motion, double dt, Matrix3Xd& v) const = 0;
 };
 

@@ -11,9 +11,9 @@ class VelocityIntegrator : public Integrator {
     motion.d = v * dt;
     motion.d_previous = motion.d;
   }
-  void change_step(const Dynamics&, double, double dt, double new_dt, Motion& motion) override {
-    motion.d *= new_dt / dt;
-    motion.d_previous = motion.d;
+  void closing_velocity(const Dynamics&, double, double dt, const Motion& motion,
+                        Matrix3Xd& v) override {
+    velocity(motion, dt, v);
   }
   void velocity(const Motion& motion, double dt, Matrix3Xd& v) const override { v = motion.d / dt; }
 };

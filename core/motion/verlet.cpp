@@ -41,14 +41,12 @@ class Verlet : public Integrator {
     motion.x += motion.d;
   }
 
-  // The new d is the displacement that steps of new_dt would have had; the extrapolated velocity
-  // stays.
-  void change_step(const Dynamics& dynamics, double time, double dt, double new_dt,
-                   Motion& motion) override {
+  // v = d / dt + a dt / 2: d stands for the velocity half a step ago
+  void closing_velocity(const Dynamics& dynamics, double time, double dt, const Motion& motion,
+                        Matrix3Xd& v) override {
     velocity(motion, dt, v_);
     accelerate(dynamics, time, motion.x, v_, a_);
-    motion.d = motion.d * (new_dt / dt) + a_ * (new_dt * (dt - new_dt) / 2);
-    motion.d_previous = 3 * motion.d - v_ * (2 * new_dt);
+    v = motion.d / dt + a_ * (dt / 2);
   }
 
   void velocity(const Motion& motion, double dt, Matrix3Xd& v) const override {

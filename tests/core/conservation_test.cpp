@@ -1,0 +1,203 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/forces/air.h"
+#include "core/forces/springs.h"
+#include "tests/support/core/scenes.h"
+
+namespace weft::testing {
+namespace {
+
+Scene tumbling(double damping) {
+  SheetDefinition sheet = flat_sheet(6, 7, 0.05);
+  sheet.textile.damping = damping;
+  sheet.start_positions = values(start_positions(sheet) + 0.005 * noise(42));
+  sheet.start_velocities = values(0.5 * noise(42, 2));
+  return floating(sheet);
+}
+
+void run(Simulation& simulation, int frames) {
+  for (int i = 0; i < frames; ++i) ASSERT_TRUE(simulation.advance_frame());
+}
+
+Vector3d momentum(const Simulation& simulation) {
+  return 1e-3 * velocities(simulation).rowwise().sum();  // kg m/s, 1 g each
+}
+
+Vector3d angular_momentum(const Matrix3Xd& x, const Matrix3Xd& v) {
+  Vector3d sum = Vector3d::Zero();
+  for (Eigen::Index i = 0; i < x.cols(); ++i)
+    sum += 1e-3 * Vector3d(x.col(i)).cross(Vector3d(v.col(i)));
+  return sum;
+}
+
+TEST(Conservation, FreeFallIsExactForEveryIntegratorButEuler) {
+  for (const auto integrator :
+       {IntegratorKind::kVerlet, IntegratorKind::kMidpoint, IntegratorKind::kRk4}) {
+    SheetDefinition sheet = flat_sheet(4, 4);
+    sheet.start_velocities = values(Vector3d(1, 2, 3).replicate(1, 16));
+    Scene scene = floating(sheet);
+    scene.environment.gravity = {0, -9.8, 0};
+    scene.solver.integrator = integrator;
+    scene.solver.substep = 1e-4;
+    scene.solver.allow_unstable = true;
+    Simulation simulation(scene);
+    run(simulation, 50);
+    const double t = simulation.time();
+    const Vector3d expected = Vector3d(1, 2, 3) * t + Vector3d(0, -4.9, 0) * t * t;
+    const Matrix3Xd fallen = start_positions(sheet).colwise() + expected;
+    EXPECT_LT((positions(simulation) - fallen).cwiseAbs().maxCoeff(), 1e-11);
+  }
+}
+
+TEST(Conservation, MomentumStaysWithoutOutsideForces) {
+  Simulation simulation(tumbling(2e-3));
+  const Vector3d before = momentum(simulation);
+  run(simulation, 200);
+  EXPECT_LT((momentum(simulation) - before).norm(), 1e-12);
+}
+
+// Verlet keeps sum m x(t) x x(t + dt) / dt to rounding.
+TEST(Conservation, AngularMomentumStaysWithoutDamping) {
+  Scene scene = tumbling(0);
+  scene.solver.frame_step = Simulation(scene).plan().step.substep;
+  Simulation simulation(scene);
+  const auto advance = [&] {
+    const Matrix3Xd before = positions(simulation);
+    run(simulation, 1);
+    return angular_momentum(before, positions(simulation) - before);
+  };
+  const Vector3d first = advance();
+  run(simulation, 5000);
+  EXPECT_LT((advance() - first).norm(), 1e-10 * first.norm());
+}
+
+// Eq. 7 is not central: its torque is that of -k_d (v_i - v_j) on each pair.
+TEST(Conservation, DampingChangesAngularMomentumByExactlyItsTorque) {
+  Scene scene = tumbling(5e-3);
+  scene.solver.frame_step = 1e-5;
+  scene.solver.substep = 1e-5;
+  Simulation simulation(scene);
+  const Mesh mesh = make_lattice(scene.sheets[0]);
+  Vector3d impulse = Vector3d::Zero();
+  const auto torque = [&] {
+    const Matrix3Xd x = positions(simulation), v = velocities(simulation);
+    Vector3d sum = Vector3d::Zero();
+    for (const Family& family : mesh.families)
+      for (const auto& [i, j] : family.connections)
+        sum += Vector3d(x.col(i) - x.col(j)).cross(Vector3d(5e-3 * (v.col(j) - v.col(i))));
+    return sum;
+  };
+  const Vector3d before = angular_momentum(positions(simulation), velocities(simulation));
+  Vector3d last = torque();
+  for (int i = 0; i < 2000; ++i) {
+    run(simulation, 1);
+    const Vector3d now = torque();
+    impulse += (last + now) / 2 * 1e-5;
+    last = now;
+  }
+  const Vector3d change = angular_momentum(positions(simulation), velocities(simulation)) - before;
+  EXPECT_GT(change.norm(), 0.05 * before.norm());
+  EXPECT_LT((change - impulse).norm(), 2e-3 * change.norm());
+}
+
+double energy(const Mesh& mesh, const Matrix3Xd& x) {
+  return spring_energy(mesh, x) + isometric_energy(mesh, x);
+}
+
+TEST(Conservation, ForcesAreTheGradientOfTheEnergyForEveryBendingLaw) {
+  std::vector<BendingLaw> laws = {Isometric{}};
+  for (const Evaluator evaluator :
+       {Evaluator::kSeries, Evaluator::kExact, Evaluator::kLinearized, Evaluator::kPolynomial})
+    laws.push_back(ChoiKo{.evaluator = evaluator});
+  for (const BendingLaw& law : laws) {
+    SheetDefinition sheet = flat_sheet(5, 6, 0.05);
+    sheet.bending = law;
+    sheet.textile.model = MeasuredTextile{.areal_density = 0.2,
+                                          .tensile_warp = 500,
+                                          .tensile_weft = 300,
+                                          .shear = 40,
+                                          .bend_rigidity_warp = 2e-3,
+                                          .bend_rigidity_weft = 1e-3};
+    sheet.textile.damping = 0;
+    const Mesh mesh = make_lattice(sheet);
+    Matrix3Xd x = start_positions(sheet) + 0.01 * noise(30), force = Matrix3Xd::Zero(3, 30);
+    add_spring_forces(mesh, x, x, force);
+    add_isometric_forces(mesh, x, force);
+    const double step = 1e-7;
+    for (int i = 0; i < 30; ++i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double here = x(axis, i);
+        x(axis, i) = here + step;
+        const double above = energy(mesh, x);
+        x(axis, i) = here - step;
+        const double below = energy(mesh, x);
+        x(axis, i) = here;
+        EXPECT_NEAR(force(axis, i), -(above - below) / (2 * step), 1e-6 * (1 + force.norm()))
+            << "law " << law.index() << " particle " << i << " axis " << axis;
+      }
+    }
+  }
+}
+
+// Nothing switches on a sheet held stretched: there the linear bound decides.
+TEST(Conservation, EnergyOfAPreStretchedSheetStaysWithinTwoPercentOver100000UndampedSteps) {
+  SheetDefinition sheet = flat_sheet(8, 8, 0.05);
+  sheet.textile.damping = 0;
+  sheet.start_positions = values(stretched(sheet, 0.05));
+  sheet.start_velocities = values(0.02 * noise(64));
+  Pin rim;
+  for (int i = 0; i < 64; ++i)
+    if (i % 8 == 0 || i % 8 == 7 || i < 8 || i >= 56) rim.particles.push_back(i);
+  sheet.pins = {rim};
+  Scene scene = floating(sheet);
+  const double bound = Simulation(scene).plan().step.linear_bound;
+  scene.solver.substep = 0.9 * bound;
+  scene.solver.frame_step = 1000 * 0.9 * bound;
+  Simulation simulation(scene);
+  const FrameStats start = simulation.stats();
+  const double resting = spring_energy(make_lattice(sheet), stretched(sheet, 0.05));
+  const double swinging = start.kinetic_energy + start.potential_energy - resting;
+  double largest = 0;
+  for (int frame = 0; frame < 100; ++frame) {
+    run(simulation, 1);
+    const FrameStats now = simulation.stats();
+    largest =
+        std::max(largest, std::abs(now.kinetic_energy + now.potential_energy - resting - swinging));
+  }
+  EXPECT_LT(largest, 0.02 * (start.kinetic_energy + start.potential_energy));
+  RecordProperty("share_of_swinging_energy", std::to_string(largest / swinging));
+}
+
+// Largest growth of the energy of a free sheet, k_d = 0, that buckles for 1 s, as a share.
+double buckling_growth(double share_of_bound) {
+  SheetDefinition sheet = flat_sheet(8, 8, 0.05);
+  sheet.textile.damping = 0;
+  sheet.start_velocities = values(0.2 * noise(64));
+  Scene scene = floating(sheet);
+  scene.solver.safety = share_of_bound;
+  Simulation simulation(scene);
+  const FrameStats start = simulation.stats();
+  const double energy = start.kinetic_energy + start.potential_energy;
+  double growth = 0;
+  for (int frame = 0; frame < 100; ++frame) {
+    EXPECT_TRUE(simulation.advance_frame());
+    const FrameStats now = simulation.stats();
+    growth = std::max(growth, (now.kinetic_energy + now.potential_energy) / energy - 1);
+  }
+  return growth;
+}
+
+TEST(Conservation, EnergyGrowthOfAFreeBucklingSheetFallsAtLeastWithTheSquareOfTheStep) {
+  const double half = buckling_growth(0.5), quarter = buckling_growth(0.25),
+               tenth = buckling_growth(0.1);
+  RecordProperty("growth_at_half", std::to_string(half));
+  RecordProperty("growth_at_quarter", std::to_string(quarter));
+  RecordProperty("growth_at_tenth", std::to_string(tenth));
+  EXPECT_LT(quarter, half / 4);
+  EXPECT_LT(tenth, half / 25);
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -1,0 +1,162 @@
+#include "core/contact/contact.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/support/core/scenes.h"
+
+namespace weft::testing {
+namespace {
+
+Collider body(decltype(Collider::shape) shape, double friction = 0.3) {
+  return {"body", shape, friction, {}};
+}
+
+Quaterniond tilted() { return Quaterniond(Eigen::AngleAxisd(0.6, Vector3d(1, 2, 3).normalized())); }
+
+std::vector<Collider> every_shape() {
+  return {body(Plane{Vector3d(0, -0.2, 0), Vector3d(0.1, 2, 0)}),
+          body(Sphere{Vector3d(0.2, -0.25, 0.2), 0.2}),
+          body(Box{Vector3d(0.2, -0.2, 0.2), Vector3d(0.15, 0.1, 0.12), tilted()}),
+          body(Capsule{Vector3d(0.05, -0.1, 0.1), Vector3d(0.35, -0.2, 0.3), 0.06})};
+}
+
+TEST(Contact, DistancesAreThoseOfTheGeometry) {
+  EXPECT_DOUBLE_EQ(distance(Plane{Vector3d(0, 1, 0), Vector3d(0, 2, 0)}, {5, 4, 0}).value, 3);
+  EXPECT_DOUBLE_EQ(distance(Sphere{Vector3d(1, 0, 0), 2}, {1, 5, 0}).value, 3);
+  const Box box{Vector3d::Zero(), Vector3d(1, 2, 3)};
+  EXPECT_DOUBLE_EQ(distance(box, {4, 6, 3}).value, 5);           // from an edge
+  EXPECT_DOUBLE_EQ(distance(box, {0.5, 1.75, 0}).value, -0.25);  // inside
+  EXPECT_EQ(distance(box, {0.5, -1.75, 0}).normal, -Vector3d::UnitY());
+  const Capsule capsule{Vector3d::Zero(), Vector3d(2, 0, 0), 0.5};
+  EXPECT_DOUBLE_EQ(distance(capsule, {1, 2, 0}).value, 1.5);
+  EXPECT_DOUBLE_EQ(distance(capsule, {5, 4, 0}).value, 4.5);
+}
+
+// The normal is the gradient of the distance, inside and outside, on turned bodies too.
+TEST(Contact, NormalsAreGradientsOfTheDistance) {
+  const Matrix3Xd points = 0.5 * noise(200);
+  for (const Collider& collider : every_shape()) {
+    for (Eigen::Index i = 0; i < points.cols(); ++i) {
+      const Distance here = distance(collider, points.col(i), 0);
+      const double step = 1e-6;
+      const double ahead = distance(collider, points.col(i) + step * here.normal, 0).value;
+      EXPECT_NEAR((ahead - here.value) / step, 1, 1e-4) << collider.shape.index();
+      EXPECT_NEAR(here.normal.norm(), 1, 1e-12);
+    }
+  }
+}
+
+Scene drop_on(const std::vector<Collider>& colliders) {
+  Scene scene = floating(flat_sheet(13, 13));
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.colliders = colliders;
+  scene.solver.frame_step = 0.02;
+  return scene;
+}
+
+TEST(Contact, NoFreeParticleEndsAStepInsideACollider) {
+  for (const Collider& collider : every_shape()) {
+    Scene scene = drop_on({collider});
+    scene.solver.frame_step = Simulation(scene).plan().step.substep;
+    Simulation simulation(scene);
+    int touching = 0;
+    for (int step = 0; step < 2000; ++step) {
+      ASSERT_TRUE(simulation.advance_frame());
+      const Matrix3Xd x = positions(simulation);
+      for (Eigen::Index i = 0; i < x.cols(); ++i) {
+        const double value = distance(collider, x.col(i), simulation.time()).value;
+        ASSERT_GE(value, 0) << "shape " << collider.shape.index() << " step " << step;
+        if (value < 0.1 / 30 * 1.001) ++touching;
+      }
+    }
+    EXPECT_GT(touching, 0) << "shape " << collider.shape.index();
+  }
+}
+
+TEST(Contact, WhereCollidersOverlapAParticleEntersByAtMostTheSkin) {
+  const std::vector<Collider> colliders = every_shape();
+  Simulation simulation(drop_on(colliders));
+  for (int frame = 0; frame < 40; ++frame) {
+    ASSERT_TRUE(simulation.advance_frame());
+    const Matrix3Xd x = positions(simulation);
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+      for (const Collider& collider : colliders)
+        ASSERT_GE(distance(collider, x.col(i), simulation.time()).value, -0.1 / 30);
+  }
+}
+
+// A sheet without springs on an incline: each particle is a block of the textbook.
+double slide_on_incline(double angle, double friction, double seconds) {
+  SheetDefinition sheet = flat_sheet(2, 2, 0.01);
+  sheet.textile = {RawTextile{.particle_mass = 1e-3}, 0, friction};
+  const Quaterniond turn(Eigen::AngleAxisd(-angle, Vector3d::UnitZ()));
+  sheet.rotation = turn;
+  sheet.skin = 1e-3;
+  sheet.origin = turn * Vector3d(0, 1e-3, 0);
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.colliders = {body(Plane{Vector3d::Zero(), turn * Vector3d::UnitY()}, friction)};
+  scene.solver.substep = 1e-4;
+  scene.solver.frame_step = 0.01;
+  Simulation simulation(scene);
+  const Matrix3Xd start = positions(simulation);
+  while (simulation.time() < seconds - 1e-9) EXPECT_TRUE(simulation.advance_frame());
+  return (positions(simulation) - start).col(0).norm();
+}
+
+TEST(Contact, ABlockOnAnInclineSticksBelowTheFrictionAngleAndSlidesAboveItAsCoulombSays) {
+  const double angle = 0.5, seconds = 0.5;
+  EXPECT_LT(slide_on_incline(angle, std::tan(angle) * 1.05, seconds), 1e-6);
+  const double friction = 0.2;
+  const double a = 9.8 * (std::sin(angle) - friction * std::cos(angle));
+  EXPECT_NEAR(slide_on_incline(angle, friction, seconds) / (a * seconds * seconds / 2), 1, 2e-3);
+  const double free = 9.8 * std::sin(angle);
+  EXPECT_NEAR(slide_on_incline(angle, 0, seconds) / (free * seconds * seconds / 2), 1, 2e-3);
+}
+
+TEST(Contact, AMovingColliderCarriesWhatLiesOnItByFriction) {
+  SheetDefinition sheet = flat_sheet(2, 2, 0.05);
+  sheet.textile.friction = 1;
+  sheet.origin = {0, 0.005, 0};
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  Collider belt = body(Plane{}, 1);
+  belt.path = {{0, Vector3d::Zero()}, {1, Vector3d(0.5, 0.2, 0)}};
+  scene.colliders = {belt};
+  Simulation simulation(scene);
+  const Matrix3Xd start = positions(simulation);
+  for (int frame = 0; frame < 100; ++frame) ASSERT_TRUE(simulation.advance_frame());
+  const Matrix3Xd moved = positions(simulation) - start;
+  EXPECT_NEAR(moved(0, 0), 0.5, 0.03);  // it slips until it is as fast as the belt
+  EXPECT_NEAR(moved(1, 0), 0.2, 1e-6);
+}
+
+TEST(Contact, ASheetThatStartsInsideComesOutWithoutBeingThrown) {
+  SheetDefinition sheet = flat_sheet(3, 3, 0.05);
+  sheet.origin = {0, -0.02, 0};
+  Scene scene = floating(sheet);
+  scene.colliders = {body(Plane{})};
+  Simulation simulation(scene);
+  ASSERT_TRUE(simulation.advance_frame());
+  EXPECT_NEAR(positions(simulation)(1, 4), 0.005, 1e-12);  // on the skin
+  EXPECT_LT(velocities(simulation).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST(Contact, AnImpactTakesAwayTheApproachAndLeavesTheSliding) {
+  SheetDefinition sheet = flat_sheet(2, 2, 0.05);
+  sheet.textile = {RawTextile{.particle_mass = 1e-3}, 0, 0};
+  sheet.origin = {0, 0.1, 0};
+  sheet.start_velocities = values(Vector3d(0.7, -2, 0.1).replicate(1, 4));
+  Scene scene = floating(sheet);
+  scene.colliders = {body(Plane{}, 0)};
+  scene.solver.substep = 1e-3;
+  Simulation simulation(scene);
+  for (int frame = 0; frame < 10; ++frame) ASSERT_TRUE(simulation.advance_frame());
+  EXPECT_LT((velocities(simulation).col(0) - Vector3d(0.7, 0, 0.1)).norm(), 1e-9);
+}
+
+}  // namespace
+}  // namespace weft::testing

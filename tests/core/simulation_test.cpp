@@ -1,0 +1,265 @@
+#include "core/simulation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+#include "tests/support/core/scenes.h"
+
+namespace weft::testing {
+namespace {
+
+Scene hanging(double bend = 1e-5) {
+  SheetDefinition sheet = flat_sheet(7, 7, 0.05);
+  sheet.textile = paper_textile(bend);
+  sheet.pins = {{{0, 6}, {}}};
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  return scene;
+}
+
+void run(Simulation& simulation, int frames) {
+  for (int i = 0; i < frames; ++i) ASSERT_TRUE(simulation.advance_frame());
+}
+
+TEST(Simulation, FrameZeroIsTheInitialState) {
+  const Scene scene = hanging();
+  const Simulation simulation(scene);
+  EXPECT_EQ(simulation.frame(), 0);
+  EXPECT_EQ(positions(simulation), start_positions(scene.sheets[0]));
+  EXPECT_LT(velocities(simulation).cwiseAbs().maxCoeff(), 1e-15);
+}
+
+TEST(Simulation, StartVelocitiesAreThoseGivenForEveryIntegrator) {
+  for (const auto integrator : {IntegratorKind::kVerlet, IntegratorKind::kEuler,
+                                IntegratorKind::kMidpoint, IntegratorKind::kRk4}) {
+    Scene scene = hanging();
+    const Matrix3Xd v = noise(49);
+    scene.sheets[0].start_velocities = values(v);
+    scene.sheets[0].pins.clear();
+    scene.solver.integrator = integrator;
+    scene.solver.substep = 1e-5;
+    scene.solver.allow_unstable = true;
+    EXPECT_LT((velocities(Simulation(scene)) - v).cwiseAbs().maxCoeff(), 1e-10);
+  }
+}
+
+TEST(Simulation, EqualScenesGiveEqualBits) {
+  Simulation first(hanging()), second(hanging());
+  run(first, 20);
+  run(second, 20);
+  const Matrix3Xd a = positions(first), b = positions(second);
+  EXPECT_EQ(std::memcmp(a.data(), b.data(), sizeof(double) * static_cast<std::size_t>(a.size())),
+            0);
+}
+
+TEST(Simulation, AHeldParticleNeverMovesAndALedOneNeverLeavesItsPath) {
+  for (const auto integrator : {IntegratorKind::kVerlet, IntegratorKind::kRk4}) {
+    Scene scene = hanging();
+    scene.solver.integrator = integrator;
+    const Path path = {
+        {0, Vector3d::Zero()}, {0.1, Vector3d(0.2, 0.1, 0)}, {0.25, Vector3d(0, 0, 0.3)}};
+    scene.sheets[0].pins = {{{0}, {}}, {{6}, path}};
+    scene.colliders = {{"ball", Sphere{Vector3d(0.15, -0.3, 0.15), 0.1}, 0.3, {}}};
+    Simulation simulation(scene);
+    const Matrix3Xd start = start_positions(scene.sheets[0]);
+    for (int frame = 0; frame < 40; ++frame) {
+      run(simulation, 1);
+      const Matrix3Xd x = positions(simulation);
+      ASSERT_EQ(x.col(0), start.col(0));
+      ASSERT_LT((x.col(6) - start.col(6) - offset_at(path, simulation.time())).norm(), 1e-15);
+    }
+  }
+}
+
+// The tension in a hanging strip is the weight below it: sum of m g / k over the rows.
+TEST(Simulation, AStripHungByOneEndStretchesByItsOwnWeight) {
+  SheetDefinition sheet = flat_sheet(12, 2, 0.05);
+  sheet.textile = {RawTextile{.particle_mass = 1e-2, .stretch = 200, .air_drag = 0.2}, 0.05, 0};
+  sheet.rotation = Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitX()));
+  sheet.pins = {{{0, 1}, {}}};
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  Simulation simulation(scene);
+  while (!simulation.at_rest() && simulation.time() < 60) run(simulation, 1);
+  ASSERT_TRUE(simulation.at_rest());
+  double expected = 11 * 0.05;
+  for (int below = 1; below <= 11; ++below) expected += below * 1e-2 * 9.8 / 200;
+  EXPECT_NEAR(-positions(simulation)(1, 22), expected, 2e-4 * expected);
+}
+
+TEST(Simulation, APlanNamesWhatRunsAndWhatIsSkippedAndWhy) {
+  Scene scene = hanging(0);
+  const Plan plan = Simulation(scene).plan();
+  const auto skipped = [&](const std::string& pass) {
+    return std::any_of(plan.skipped.begin(), plan.skipped.end(),
+                       [&](const SkippedPass& s) { return s.pass == pass && !s.reason.empty(); });
+  };
+  EXPECT_TRUE(skipped("sheet: bend"));
+  EXPECT_TRUE(skipped("sheet: drag"));
+  EXPECT_TRUE(skipped("wind"));
+  EXPECT_TRUE(skipped("contact"));
+  EXPECT_FALSE(skipped("sheet: stretch"));
+}
+
+std::vector<std::string> warnings(const Scene& scene) {
+  std::vector<std::string> codes;
+  const Simulation simulation(scene);
+  for (const Warning& warning : simulation.plan().warnings) codes.push_back(warning.code);
+  return codes;
+}
+
+bool warns(const Scene& scene, const std::string& code) {
+  const auto codes = warnings(scene);
+  return std::find(codes.begin(), codes.end(), code) != codes.end();
+}
+
+TEST(Simulation, APlanWarnsOfWhatTheModelLeavesOut) {
+  Scene scene = hanging();
+  EXPECT_EQ(warnings(scene), std::vector<std::string>{"NO_SELF_COLLISION"});
+  scene.sheets.push_back(scene.sheets[0]);
+  scene.sheets[1].name = "other";
+  scene.colliders = {{"table", Box{Vector3d::Zero(), Vector3d(1, 1, 1)}, 0.3, {}}};
+  EXPECT_TRUE(warns(scene, "NO_SHEET_SHEET_COLLISION"));
+  EXPECT_TRUE(warns(scene, "BOX_EDGES"));
+}
+
+// c_b L^3 / k_b = 2000 x 0.1^3 / k_b falls below 31.47 at k_b = 0.0636; L is 0.1 on the axes.
+TEST(Simulation, APlanWarnsWhereTheClampLeavesTheBendingConstantWithoutEffect) {
+  EXPECT_FALSE(warns(hanging(0.063), "CLAMP_RULES"));
+  EXPECT_TRUE(warns(hanging(0.064), "CLAMP_RULES"));
+}
+
+TEST(Simulation, UnderTheClampTwoBendingConstantsGiveTheSameBits) {
+  Simulation soft(hanging(0.2)), stiff(hanging(0.6));
+  run(soft, 10);
+  run(stiff, 10);
+  EXPECT_EQ(positions(soft), positions(stiff));
+}
+
+// h_min = (96 B / (c_b kappa^2))^(1/4) / 2, kappa = (rho g / B)^(1/3): 4.2 mm for this cloth.
+TEST(Simulation, APlanWarnsOfAMeshTooFineForInterlacedConnections) {
+  const auto scene_with = [](double h) {
+    Scene scene = hanging();
+    scene.sheets[0].grid.spacing = h;
+    scene.sheets[0].textile.model = MeasuredTextile{.areal_density = 0.15,
+                                                    .tensile_warp = 2000,
+                                                    .tensile_weft = 2000,
+                                                    .shear = 50,
+                                                    .bend_rigidity_warp = 1e-5,
+                                                    .bend_rigidity_weft = 1e-5};
+    return scene;
+  };
+  const double kappa = std::cbrt(0.15 * 9.8 / 1e-5);
+  const double finest = std::pow(96 * 1e-5 / (2000 * kappa * kappa), 0.25) / 2;
+  EXPECT_FALSE(warns(scene_with(1.01 * finest), "MESH_TOO_FINE"));
+  EXPECT_TRUE(warns(scene_with(0.99 * finest), "MESH_TOO_FINE"));
+}
+
+TEST(Simulation, ASheetComesToRestAndIsToldSo) {
+  Scene scene = hanging();
+  std::get<RawTextile>(scene.sheets[0].textile.model).air_drag = 0.02;
+  Simulation simulation(scene);
+  EXPECT_FALSE(simulation.at_rest());
+  while (!simulation.at_rest() && simulation.time() < 100) run(simulation, 1);
+  EXPECT_TRUE(simulation.at_rest());
+  EXPECT_LT(simulation.stats().kinetic_energy, 1e-6 * 49e-3 * 9.8 * 0.3);
+}
+
+TEST(Simulation, AChangeOfTextileKeepsPositionsAndVelocities) {
+  Simulation simulation(hanging());
+  run(simulation, 20);
+  const Matrix3Xd x = positions(simulation), v = velocities(simulation);
+  Textile stiffer = paper_textile(1e-3);
+  std::get<RawTextile>(stiffer.model).stretch = 8000;
+  const double step = simulation.plan().step.substep;
+  ASSERT_FALSE(simulation.set_textile(0, stiffer));
+  EXPECT_LT(simulation.plan().step.substep, step);
+  EXPECT_EQ(positions(simulation), x);
+  // known to second order in the step on both sides
+  EXPECT_LT((velocities(simulation) - v).cwiseAbs().maxCoeff(),
+            0.01 * v.colwise().norm().maxCoeff());
+}
+
+TEST(Simulation, SettingTheSameTextileChangesNoBit) {
+  Simulation changed(hanging()), left(hanging());
+  run(changed, 10);
+  run(left, 10);
+  ASSERT_FALSE(changed.set_textile(0, changed.scene().sheets[0].textile));
+  run(changed, 10);
+  run(left, 10);
+  EXPECT_EQ(positions(changed), positions(left));
+}
+
+// On a taut sheet, where nothing switches, changing the step midway costs no order.
+TEST(Simulation, AChangeOfStepIsOfSecondOrder) {
+  const auto end = [](double safety) {
+    Scene scene = hanging();
+    SheetDefinition& sheet = scene.sheets[0];
+    sheet.start_positions = values(stretched(sheet, 0.05));
+    Matrix3Xd v = Matrix3Xd::Zero(3, 49);
+    for (int i = 0; i < 49; ++i)
+      v(1, i) = std::sin(std::numbers::pi * (i % 7) / 6) * std::sin(std::numbers::pi * (i / 7) / 6);
+    sheet.start_velocities = values(v);
+    sheet.pins = {Pin{}};
+    for (int i = 0; i < 49; ++i)
+      if (i % 7 == 0 || i % 7 == 6 || i < 7 || i >= 42) sheet.pins[0].particles.push_back(i);
+    scene.solver.safety = safety;
+    Simulation simulation(scene);
+    run(simulation, 2);
+    Textile damped = paper_textile();
+    damped.damping = 0.05;  // a shorter step
+    const double step = simulation.plan().step.substep;
+    EXPECT_FALSE(simulation.set_textile(0, damped));
+    EXPECT_LT(simulation.plan().step.substep, 0.95 * step);
+    run(simulation, 1);
+    return positions(simulation);
+  };
+  const Matrix3Xd truth = end(0.01);
+  const double coarse = (end(0.4) - truth).norm(), fine = (end(0.2) - truth).norm();
+  EXPECT_GT(coarse / fine, 3.3);
+}
+
+TEST(Simulation, ARefusedTextileChangesNothing) {
+  Scene scene = hanging();
+  scene.solver.substep = Simulation(scene).plan().step.linear_bound * 0.99;
+  Simulation simulation(scene), left(scene);
+  Textile stiffer = paper_textile();
+  std::get<RawTextile>(stiffer.model).stretch = 1e5;
+  EXPECT_TRUE(simulation.set_textile(0, stiffer));
+  run(simulation, 5);
+  run(left, 5);
+  EXPECT_EQ(positions(simulation), positions(left));
+}
+
+TEST(Simulation, ADivergedRunIsReportedNotPublished) {
+  Scene scene = hanging();
+  scene.solver.substep = 0.01;
+  scene.solver.allow_unstable = true;
+  Simulation simulation(scene);
+  int frames = 0;
+  while (simulation.advance_frame() && frames < 10000) ++frames;
+  EXPECT_LT(frames, 10000);
+  EXPECT_EQ(simulation.frame(), frames);
+}
+
+TEST(Simulation, SheetsInOneSceneMoveAsTheyDoAlone) {
+  Scene one = hanging(), other = hanging(1e-4), both = hanging();
+  other.sheets[0].name = "other";
+  other.sheets[0].grid = {4, 9, 0.05};
+  other.sheets[0].pins = {{{0, 8}, {}}};
+  both.sheets.push_back(other.sheets[0]);
+  for (Scene* scene : {&one, &other, &both}) scene->solver.substep = 1e-4;
+  Simulation a(one), b(other), together(both);
+  run(a, 10);
+  run(b, 10);
+  run(together, 10);
+  const Matrix3Xd all = positions(together);
+  EXPECT_EQ(all.leftCols(49), positions(a));
+  EXPECT_EQ(all.rightCols(36), positions(b));
+}
+
+}  // namespace
+}  // namespace weft::testing

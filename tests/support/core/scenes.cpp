@@ -1,0 +1,65 @@
+#include "tests/support/core/scenes.h"
+
+#include <random>
+
+namespace weft::testing {
+
+Textile paper_textile(double bend) {
+  return {RawTextile{.particle_mass = 1e-3, .stretch = 2000, .shear = 2000, .bend = bend}, 2e-4,
+          0.3};
+}
+
+SheetDefinition flat_sheet(int rows, int columns, double spacing) {
+  SheetDefinition sheet;
+  sheet.name = "sheet";
+  sheet.grid = {rows, columns, spacing};
+  sheet.textile = paper_textile();
+  return sheet;
+}
+
+Scene floating(const SheetDefinition& sheet) {
+  Scene scene;
+  scene.sheets = {sheet};
+  scene.environment.gravity.setZero();
+  scene.solver.frame_step = 0.01;
+  return scene;
+}
+
+Matrix3Xd noise(int particles, unsigned seed) {
+  std::mt19937_64 random(seed);
+  Matrix3Xd out(3, particles);
+  for (double& value : out.reshaped()) value = static_cast<double>(random()) * 0x1p-63 - 1;
+  return out;
+}
+
+namespace {
+
+Matrix3Xd from_planes(const std::vector<double>& planes) {
+  const auto n = static_cast<Eigen::Index>(planes.size() / 3);
+  return Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 3>>(planes.data(), n, 3)
+      .transpose();
+}
+
+}  // namespace
+
+Matrix3Xd positions(const Simulation& simulation) {
+  std::vector<double> planes(3 * static_cast<std::size_t>(simulation.particle_count()));
+  simulation.copy_positions(planes);
+  return from_planes(planes);
+}
+
+Matrix3Xd velocities(const Simulation& simulation) {
+  std::vector<double> planes(3 * static_cast<std::size_t>(simulation.particle_count()));
+  simulation.copy_velocities(planes);
+  return from_planes(planes);
+}
+
+std::vector<double> values(const Matrix3Xd& columns) {
+  return {columns.data(), columns.data() + columns.size()};
+}
+
+Matrix3Xd stretched(const SheetDefinition& sheet, double strain) {
+  return start_positions(sheet) * (1 + strain);
+}
+
+}  // namespace weft::testing

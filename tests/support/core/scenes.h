@@ -1,0 +1,30 @@
+#pragma once
+
+#include "core/model/mesh.h"
+#include "core/simulation.h"
+
+namespace weft::testing {
+
+// The paper's textile on a mesh: 1 g, k = 2000 N/m, k_d = 2e-4 kg/s.
+Textile paper_textile(double bend = 1e-5);
+
+// A flat sheet of the paper's textile at the origin.
+SheetDefinition flat_sheet(int rows, int columns, double spacing = 1.0 / 30);
+
+// One sheet without gravity, colliders or pins.
+Scene floating(const SheetDefinition& sheet);
+
+// Fixed pseudo-random numbers in -1 ... 1.
+Matrix3Xd noise(int particles, unsigned seed = 1);
+
+// (3 x particles) of one sheet.
+Matrix3Xd positions(const Simulation& simulation);
+Matrix3Xd velocities(const Simulation& simulation);
+
+// Start positions and velocities in the order of a scene.
+std::vector<double> values(const Matrix3Xd& columns);
+
+// Positions of a sheet stretched by `strain` in its plane.
+Matrix3Xd stretched(const SheetDefinition& sheet, double strain);
+
+}  // namespace weft::testing

@@ -136,13 +136,6 @@ grpc::Status textile_not_found(const std::string& name) {
   return to_grpc(status);
 }
 
-grpc::Status textile_not_found(const std::string& name) {
-  auto status =
-      make(grpc::StatusCode::NOT_FOUND, "TEXTILE_NOT_FOUND", "there is no textile " + name);
-  add_resource(status, "Textile", name);
-  return to_grpc(status);
-}
-
 grpc::Status failed_precondition(const std::string& reason, const std::string& message,
                                  const Metadata& metadata) {
   return to_grpc(make(grpc::StatusCode::FAILED_PRECONDITION, reason, message, metadata));

@@ -27,7 +27,6 @@ grpc::Status message_malformed(const std::string& type);
 grpc::Status session_not_found(const std::string& name);
 grpc::Status session_exists(const std::string& name);
 grpc::Status textile_not_found(const std::string& name);
-grpc::Status textile_not_found(const std::string& name);
 
 grpc::Status failed_precondition(const std::string& reason, const std::string& message,
                                  const Metadata& metadata = {});

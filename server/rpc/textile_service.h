@@ -1,0 +1,18 @@
+#pragma once
+
+#include "weft/v1/textile.grpc.pb.h"
+
+namespace weft {
+
+// Answers from the catalogue; the same for every caller, at any time.
+class TextileService final : public v1::TextileService::CallbackService {
+ public:
+  grpc::ServerUnaryReactor* ListTextiles(grpc::CallbackServerContext* context,
+                                         const v1::ListTextilesRequest* request,
+                                         v1::ListTextilesResponse* response) override;
+  grpc::ServerUnaryReactor* GetTextile(grpc::CallbackServerContext* context,
+                                       const v1::GetTextileRequest* request,
+                                       v1::TextilePreset* response) override;
+};
+
+}  // namespace weft

@@ -10,12 +10,13 @@
 #include "server/rpc/frame_service.h"
 #include "server/rpc/server_service.h"
 #include "server/rpc/session_service.h"
+#include "server/rpc/textile_service.h"
 
 namespace weft {
 namespace {
 
 constexpr std::array kServices = {"", "weft.v1.SessionService", "weft.v1.FrameService",
-                                  "weft.v1.ServerService"};
+                                  "weft.v1.ServerService", "weft.v1.TextileService"};
 
 void set_transport(grpc::ServerBuilder& builder, const Limits& limits) {
   using std::chrono::milliseconds, std::chrono::seconds;
@@ -48,6 +49,7 @@ struct Server::Parts {
   SessionService sessions{backend};
   FrameService frames{backend};
   ServerService server{backend};
+  TextileService textiles;
   std::unique_ptr<grpc::Server> grpc;
   bool stopped = false;
 };
@@ -59,6 +61,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
   builder.RegisterService(&parts_->sessions);
   builder.RegisterService(&parts_->frames);
   builder.RegisterService(&parts_->server);
+  builder.RegisterService(&parts_->textiles);
   int port = 0;
   if (options.host) {
     builder.AddListeningPort(*options.host + ":" + std::to_string(options.port),

@@ -1,0 +1,163 @@
+#include "server/config.h"
+
+#include <toml++/toml.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <variant>
+#include <vector>
+
+namespace weft {
+namespace {
+
+constexpr int kDefaultPort = 7311;
+constexpr std::array kLogLevels = {"trace", "debug", "info", "warn", "error", "off"};
+
+// A number that a flag and a key of the file set; "max_sessions" is --max-sessions.
+struct Number {
+  const char* key;
+  std::variant<int*, std::int64_t*> target;
+  std::int64_t low, high;
+  const char* help;
+};
+
+std::vector<Number> numbers(Config& config) {
+  ServerOptions& server = config.server;
+  Limits& limits = server.limits;
+  constexpr std::int64_t kMiB = 1 << 20;
+  return {
+      {"port", &server.port, 0, 65535, "Port to listen on; 0 takes a free one"},
+      {"workers", &server.worker_threads, 1, 1024, "Threads that advance sessions"},
+      {"max_sessions", &limits.max_sessions, 1, 100'000, "Sessions at a time"},
+      {"max_particles", &limits.max_particles_per_session, 4, 1'000'000'000,
+       "Particles in one session"},
+      {"max_streams", &limits.max_streams, 1, 100'000, "Streams at a time"},
+      {"history_bytes", &limits.history_bytes_per_session, kMiB, 1024 * kMiB * 64,
+       "Bytes of frames that a session keeps for its streams"},
+  };
+}
+
+std::string flag_of(const char* key) {
+  std::string flag = std::string("--") + key;
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  return flag;
+}
+
+[[noreturn]] void refuse(const std::string& text) { throw ConfigExit{"weftd: " + text + "\n", 2}; }
+
+void set(const Number& number, std::int64_t value, const std::string& where) {
+  if (value < number.low || value > number.high) {
+    refuse(where + " is " + std::to_string(value) + ", not within " + std::to_string(number.low) +
+           " to " + std::to_string(number.high));
+  }
+  std::visit([&](auto* target) { *target = static_cast<std::decay_t<decltype(*target)>>(value); },
+             number.target);
+}
+
+void set_log_level(Config& config, const std::string& level, const std::string& where) {
+  if (std::find(kLogLevels.begin(), kLogLevels.end(), level) == kLogLevels.end()) {
+    refuse(where + " is \"" + level + "\", not trace, debug, info, warn, error or off");
+  }
+  config.log_level = level;
+}
+
+template <class Value>
+Value value_of(const toml::node& node, const std::string& where, const char* type) {
+  if (const auto value = node.value_exact<Value>()) return *value;
+  refuse(where + " is not " + type);
+}
+
+void read_file(const std::string& path, Config& config) {
+  toml::table table;
+  try {
+    table = toml::parse_file(path);
+  } catch (const toml::parse_error& error) {
+    const auto line = error.source().begin.line;
+    refuse(path + (line > 0 ? ":" + std::to_string(line) : "") + ": " +
+           std::string(error.description()));
+  }
+  const auto known = numbers(config);
+  for (const auto& [name, node] : table) {
+    const std::string key(name.str());
+    const std::string where = path + ":" + std::to_string(node.source().begin.line) + ": " + key;
+    const auto number = std::find_if(known.begin(), known.end(),
+                                     [&](const Number& each) { return each.key == key; });
+    if (number != known.end()) {
+      set(*number, value_of<std::int64_t>(node, where, "a whole number"), where);
+    } else if (key == "host") {
+      config.server.host = value_of<std::string>(node, where, "a text");
+    } else if (key == "insecure") {
+      config.insecure = value_of<bool>(node, where, "true or false");
+    } else if (key == "log_level") {
+      set_log_level(config, value_of<std::string>(node, where, "a text"), where);
+    } else {
+      std::string keys = "host, insecure, log_level";
+      for (const auto& each : known) keys += std::string(", ") + each.key;
+      refuse(where + " is not known; there are " + keys);
+    }
+  }
+}
+
+bool is_loopback(const std::string& host) {
+  return host == "localhost" || host == "[::1]" || host.starts_with("127.");
+}
+
+}  // namespace
+
+Config read_config(int argc, const char* const* argv) {
+  Config config;
+  config.server.port = kDefaultPort;
+
+  CLI::App app("weftd - the Weft server: simulates textiles and streams their frames over gRPC.",
+               "weftd");
+  std::string file, host, log_level;
+  bool insecure = false;
+  app.add_option("--config", file, "TOML file; its keys are the flags below, with _ for -")
+      ->type_name("FILE");
+  app.add_option("--host", host, "Address to listen on [" + *config.server.host + "]")
+      ->type_name("ADDRESS");
+  app.add_flag("--insecure", insecure, "Allow a host other machines can reach, unencrypted");
+  app.add_option("--log-level", log_level, "trace, debug, info, warn, error or off [info]")
+      ->type_name("LEVEL");
+  app.set_version_flag("--version", std::string("weftd ") + WEFT_VERSION);
+  const auto known = numbers(config);
+  std::vector<std::int64_t> values(known.size());
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const auto now =
+        std::visit([](auto* target) { return std::to_string(*target); }, known[i].target);
+    app.add_option(flag_of(known[i].key), values[i], std::string(known[i].help) + " [" + now + "]")
+        ->type_name("N");
+  }
+  app.footer(
+      "Prints \"weftd listening on ADDRESS:PORT\" when it serves; logs to stderr. SIGTERM or\n"
+      "SIGINT ends every stream and call and exits with 0.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    throw ConfigExit{app.help(), 0};
+  } catch (const CLI::CallForVersion&) {
+    throw ConfigExit{app.version() + "\n", 0};
+  } catch (const CLI::ParseError& error) {
+    refuse(std::string(error.what()) + "; see weftd --help");
+  }
+
+  // flags last, so that they win
+  if (!file.empty()) read_file(file, config);
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    const std::string flag = flag_of(known[i].key);
+    if (app.count(flag) > 0) set(known[i], values[i], flag);
+  }
+  if (!host.empty()) config.server.host = host;
+  if (!log_level.empty()) set_log_level(config, log_level, "--log-level");
+  config.insecure |= insecure;
+  if (!is_loopback(*config.server.host) && !config.insecure) {
+    refuse("host is " + *config.server.host +
+           ", which other machines can reach, and nothing is encrypted; add --insecure if that is "
+           "what you want");
+  }
+  return config;
+}
+
+}  // namespace weft

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+
+#include "server/server.h"
+
+namespace weft {
+
+// What weftd was told to do.
+struct Config {
+  ServerOptions server;
+  bool insecure = false;  // may listen beyond this machine, without encryption
+  std::string log_level = "info";
+};
+
+// What ends weftd before it begins: something to print, and the exit code.
+struct ConfigExit {
+  std::string text;
+  int code = 0;  // 0: help or version, for stdout
+};
+
+// Reads flags and the file they may name; flags win. Throws ConfigExit: with every bad value named
+// by its flag, or by file, line and key, and its bound.
+Config read_config(int argc, const char* const* argv);
+
+}  // namespace weft

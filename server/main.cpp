@@ -1,0 +1,51 @@
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+
+#include "server/config.h"
+#include "server/server.h"
+
+namespace {
+
+int serve(const weft::Config& config) {
+  // blocked before there are threads, so that none but this one takes them
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("weftd"));
+  spdlog::set_level(spdlog::level::from_str(config.log_level));
+
+  weft::Server server(config.server);
+  std::printf("weftd listening on %s\n", server.address().c_str());
+  std::fflush(stdout);
+  spdlog::info("version {}, {} workers", WEFT_VERSION, config.server.worker_threads);
+
+  int signal = 0;
+  sigwait(&signals, &signal);
+  spdlog::info("{}: draining", signal == SIGINT ? "SIGINT" : "SIGTERM");
+  server.stop();
+  spdlog::info("stopped");
+  spdlog::shutdown();
+  std::_Exit(0);  // a frame that is being computed is not waited for: nobody will see it
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return serve(weft::read_config(argc, argv));
+  } catch (const weft::ConfigExit& exit) {
+    std::fputs(exit.text.c_str(), exit.code == 0 ? stdout : stderr);
+    return exit.code;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "weftd: %s\n", error.what());
+    return 1;
+  }
+}

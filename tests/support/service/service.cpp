@@ -1,0 +1,186 @@
+#include "tests/support/service/service.h"
+
+#include <utility>
+
+#include "google/rpc/status.pb.h"
+
+namespace weft::testing {
+namespace {
+
+template <class Stub, class Request, class Response>
+grpc::Status call(Stub& stub, auto method, const Request& request, Response* response) {
+  grpc::ClientContext context;
+  return (stub.*method)(&context, request, response);
+}
+
+void expect_ok(const grpc::Status& status) {
+  EXPECT_TRUE(status.ok()) << status.error_code() << ": " << status.error_message();
+}
+
+}  // namespace
+
+v1::Scene small_scene() {
+  v1::Scene scene;
+  v1::Sheet* sheet = scene.add_sheets();
+  sheet->mutable_grid()->set_rows(4);
+  sheet->mutable_grid()->set_columns(5);
+  sheet->mutable_grid()->set_spacing_m(0.05);
+  v1::RawTextile* raw = sheet->mutable_textile()->mutable_raw();
+  raw->set_particle_mass_kg(1e-3);
+  raw->set_stretch_n_per_m(200);
+  raw->set_shear_n_per_m(200);
+  raw->set_bend_n_m2(1e-5);
+  raw->set_air_drag_kg_per_s(1e-3);
+  v1::Pin* pin = sheet->add_pins();
+  pin->add_particles(0);
+  pin->add_particles(4);
+  return scene;
+}
+
+v1::Scene diverging_scene() {
+  v1::Scene scene = small_scene();
+  scene.mutable_solver()->set_frame_step_s(1);
+  scene.mutable_solver()->set_substep_s(0.05);
+  scene.mutable_solver()->set_allow_unstable(true);
+  return scene;
+}
+
+Error::Error(const grpc::Status& status)
+    : code(status.error_code()), message(status.error_message()) {
+  google::rpc::Status details;
+  details.ParseFromString(status.error_details());
+  for (const auto& detail : details.details()) {
+    google::rpc::RetryInfo retry_info;
+    detail.UnpackTo(&info);
+    detail.UnpackTo(&bad);
+    detail.UnpackTo(&resource);
+    detail.UnpackTo(&quota);
+    retry |= detail.UnpackTo(&retry_info);
+  }
+}
+
+std::string Error::metadata(const std::string& key) const {
+  const auto found = info.metadata().find(key);
+  return found == info.metadata().end() ? "" : found->second;
+}
+
+std::vector<std::string> Error::fields() const {
+  std::vector<std::string> fields;
+  for (const auto& violation : bad.field_violations()) fields.push_back(violation.field());
+  return fields;
+}
+
+Service::Service(ServerOptions options) : server(options) {}
+
+ServerOptions Service::in_process() {
+  ServerOptions options;
+  options.host.reset();
+  options.worker_threads = 2;
+  return options;
+}
+
+v1::Session Service::create(const v1::Scene& scene, const std::string& id) {
+  v1::Session session;
+  expect_ok(try_create(scene, id, &session));
+  return session;
+}
+
+grpc::Status Service::try_create(const v1::Scene& scene, const std::string& id,
+                                 v1::Session* created) {
+  v1::CreateSessionRequest request;
+  *request.mutable_session()->mutable_scene() = scene;
+  request.set_session_id(id);
+  v1::Session session;
+  return call(*sessions, &v1::SessionService::Stub::CreateSession, request,
+              created == nullptr ? &session : created);
+}
+
+v1::Session Service::get(const std::string& name) {
+  v1::GetSessionRequest request;
+  request.set_name(name);
+  v1::Session session;
+  expect_ok(call(*sessions, &v1::SessionService::Stub::GetSession, request, &session));
+  return session;
+}
+
+v1::StepSessionResponse Service::step(const std::string& name, std::int64_t count) {
+  v1::StepSessionRequest request;
+  request.set_name(name);
+  request.set_frames(count);
+  v1::StepSessionResponse response;
+  expect_ok(call(*sessions, &v1::SessionService::Stub::StepSession, request, &response));
+  return response;
+}
+
+grpc::Status Service::try_step(const v1::StepSessionRequest& request) {
+  v1::StepSessionResponse response;
+  return call(*sessions, &v1::SessionService::Stub::StepSession, request, &response);
+}
+
+v1::RunSessionResponse Service::run(const std::string& name, std::int64_t until_frame) {
+  v1::RunSessionRequest request;
+  request.set_name(name);
+  if (until_frame >= 0) request.set_until_frame(until_frame);
+  v1::RunSessionResponse response;
+  expect_ok(call(*sessions, &v1::SessionService::Stub::RunSession, request, &response));
+  return response;
+}
+
+void Service::erase(const std::string& name) {
+  v1::DeleteSessionRequest request;
+  request.set_name(name);
+  v1::DeleteSessionResponse response;
+  expect_ok(call(*sessions, &v1::SessionService::Stub::DeleteSession, request, &response));
+}
+
+Stream::Stream(Service& service, const v1::StreamFramesRequest& request)
+    : reader_(service.frames->StreamFrames(&context_, request)) {}
+
+Stream::~Stream() { cancel(); }
+
+std::optional<v1::StreamFramesResponse> Stream::read() {
+  v1::StreamFramesResponse message;
+  if (!reader_->Read(&message)) return std::nullopt;
+  return message;
+}
+
+v1::StreamHeader Stream::header() {
+  const auto message = read();
+  EXPECT_TRUE(message && message->has_header()) << "no header";
+  return message ? message->header() : v1::StreamHeader();
+}
+
+v1::Frame Stream::frame() {
+  while (auto message = read()) {
+    if (message->has_frame()) return std::move(*message->mutable_frame());
+  }
+  ADD_FAILURE() << "the stream has ended";
+  return {};
+}
+
+std::vector<v1::Frame> Stream::rest() {
+  std::vector<v1::Frame> all;
+  while (auto message = read()) {
+    if (message->has_frame()) all.push_back(std::move(*message->mutable_frame()));
+  }
+  return all;
+}
+
+grpc::Status Stream::finish() {
+  while (read()) {
+  }
+  return reader_->Finish();
+}
+
+v1::StreamFramesRequest frames_of(const v1::Session& session, std::int64_t start,
+                                  std::int64_t end) {
+  v1::StreamFramesRequest request;
+  request.set_session(session.name());
+  request.set_uid(session.uid());
+  request.set_start_frame(start);
+  if (end >= 0) request.set_end_frame(end);
+  request.mutable_format()->set_encoding(v1::FRAME_ENCODING_FLOAT64);
+  return request;
+}
+
+}  // namespace weft::testing

@@ -13,6 +13,19 @@ Distance distance_from_ball(const Vector3d& center, double radius, const Vector3
   return {length - radius, length > 0 ? Vector3d(away / length) : Vector3d(Vector3d::UnitY())};
 }
 
+Distance distance_at(const Collider& collider, const Vector3d& offset, const Vector3d& point) {
+  return std::visit([&](const auto& shape) { return distance(shape, point - offset); },
+                    collider.shape);
+}
+
+// A collider during one step.
+struct Placed {
+  const Collider& collider;
+  Vector3d offset;   // from its start, m
+  Vector3d carried;  // its displacement in the step, m
+  double friction;   // between it and the textile
+};
+
 }  // namespace
 
 Distance distance(const Plane& plane, const Vector3d& point) {
@@ -46,26 +59,31 @@ Distance distance(const Capsule& capsule, const Vector3d& point) {
 }
 
 Distance distance(const Collider& collider, const Vector3d& point, double time) {
-  const Vector3d at_start = point - offset_at(collider.path, time);
-  return std::visit([&](const auto& shape) { return distance(shape, at_start); }, collider.shape);
+  return distance_at(collider, offset_at(collider.path, time), point);
 }
 
 void resolve_contacts(std::span<const Collider> colliders, double friction, double skin,
                       double time, double dt, const VectorXd& inverse_mass, Matrix3Xd& x,
                       Matrix3Xd& d) {
+  std::vector<Placed> placed;
+  placed.reserve(colliders.size());
+  for (const Collider& collider : colliders) {
+    const Vector3d offset = offset_at(collider.path, time);
+    placed.push_back({collider, offset, offset - offset_at(collider.path, time - dt),
+                      std::sqrt(friction * collider.friction)});
+  }
+
   // bodies that overlap hand a particle to and fro; a few rounds bring it out of both
   constexpr int kRounds = 16;
   for (Eigen::Index i = 0; i < x.cols(); ++i) {
     if (inverse_mass[i] == 0) continue;
     for (int round = 0; round < kRounds; ++round) {
       int touched = 0;
-      for (const Collider& collider : colliders) {
-        const auto [value, normal] = distance(collider, x.col(i), time);
+      for (const auto& [collider, offset, carried, mu] : placed) {
+        const auto [value, normal] = distance_at(collider, offset, x.col(i));
         if (!(value < skin)) continue;
         ++touched;
         const double depth = skin - value;
-        const Vector3d carried =
-            offset_at(collider.path, time) - offset_at(collider.path, time - dt);
         const Vector3d relative = d.col(i) - carried;
         const double approach = relative.dot(normal);
 
@@ -77,8 +95,7 @@ void resolve_contacts(std::span<const Collider> colliders, double friction, doub
         const Vector3d sliding = relative - approach * normal;
         const double length = sliding.norm();
         if (length == 0) continue;
-        const double limit = std::sqrt(friction * collider.friction) * depth;
-        const Vector3d stopped = std::min(1.0, limit / length) * sliding;
+        const Vector3d stopped = std::min(1.0, mu * depth / length) * sliding;
         x.col(i) -= stopped;
         d.col(i) -= stopped;
       }

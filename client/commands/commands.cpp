@@ -1,0 +1,87 @@
+#include "client/commands/commands.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
+
+#include "client/output/text.h"
+
+namespace weft::client {
+namespace {
+
+std::string sheets_text(const v1::Scene& scene) {
+  std::string text;
+  for (const auto& sheet : scene.sheets()) {
+    if (!text.empty()) text += ", ";
+    text +=
+        fmt::format("{} ({} x {} particles, {:.4g} mm apart)", sheet.name(), sheet.grid().rows(),
+                    sheet.grid().columns(), sheet.grid().spacing_m() * 1e3);
+  }
+  return text;
+}
+
+std::string joined(const google::protobuf::RepeatedPtrField<std::string>& words) {
+  return fmt::format("{}", fmt::join(words, ", "));
+}
+
+}  // namespace
+
+void add_session_argument(CLI::App& command, std::string& session) {
+  command.add_option("SESSION", session, "Name of the session (with --embedded: a scene file)")
+      ->required();
+}
+
+std::string state_text(v1::SessionState state) {
+  switch (state) {
+    case v1::SESSION_STATE_PAUSED:
+      return "paused";
+    case v1::SESSION_STATE_RUNNING:
+      return "running";
+    case v1::SESSION_STATE_FAILED:
+      return "failed";
+    default:
+      return "unknown";
+  }
+}
+
+std::string session_text(const v1::Session& session) {
+  Facts facts;
+  facts.add("session", session.name())
+      .add("uid", session.uid())
+      .add("state", state_text(session.state()))
+      .add("frame", std::to_string(session.frame()))
+      .add("simulated time", seconds_text(session.time_s()))
+      .add("at rest", session.at_rest() ? "yes" : "no")
+      .add("sheets", sheets_text(session.scene()))
+      .add("colliders", std::to_string(session.scene().colliders_size()))
+      .add("created", google::protobuf::util::TimeUtil::ToString(session.create_time()));
+  if (!session.failure().empty()) facts.add("failure", session.failure());
+  return facts.text();
+}
+
+std::string plan_text(const v1::Plan& plan) {
+  const double frame_step = plan.substep_s() * static_cast<double>(plan.substeps_per_frame());
+  Facts facts;
+  facts.add("frame step", fmt::format("{} = {} of {}", seconds_text(frame_step),
+                                      count_of(plan.substeps_per_frame(), "substep"),
+                                      seconds_text(plan.substep_s())));
+  if (plan.linear_bound_s() > 0) {
+    facts.add("linear bound",
+              fmt::format("{}, for every shape (sheet {})", seconds_text(plan.linear_bound_s()),
+                          plan.limiting_sheet()));
+  } else {
+    facts.add("linear bound", "none for this integrator");
+  }
+  facts.add("close estimate", seconds_text(plan.estimated_bound_s()) + ", for the present shape")
+      .add("damping ratio",
+           number_text(plan.damping_ratio()) + " of the stiffest mode, 1 is critical")
+      .add("passes", joined(plan.passes()));
+  for (const auto& skipped : plan.skipped())
+    facts.add("skipped", skipped.pass() + ": " + skipped.reason());
+  for (const auto& warning : plan.warnings()) {
+    const std::string place = warning.field().empty() ? "" : " at " + warning.field();
+    facts.add("warning", fmt::format("{}{}: {}", warning.code(), place, warning.message()));
+  }
+  return facts.text();
+}
+
+}  // namespace weft::client

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "client/context.h"
+
+namespace weft::client {
+
+// Each adds one command to the command line; parsing runs it.
+void add_scene(CLI::App& app, Context& context);
+void add_session(CLI::App& app, Context& context);
+void add_textile(CLI::App& app, Context& context);
+void add_run(CLI::App& app, Context& context);
+void add_pause(CLI::App& app, Context& context);
+void add_step(CLI::App& app, Context& context);
+void add_watch(CLI::App& app, Context& context);
+void add_record(CLI::App& app, Context& context);
+void add_info(CLI::App& app, Context& context);
+void add_export(CLI::App& app, Context& context);
+void add_demo(CLI::App& app, Context& context);
+
+using Sessions = v1::SessionService::Stub;
+using Textiles = v1::TextileService::Stub;
+
+// The positional SESSION.
+void add_session_argument(CLI::App& command, std::string& session);
+
+// "paused"
+std::string state_text(v1::SessionState state);
+// What a session is and does, and what the solver does for it, for people.
+std::string session_text(const v1::Session& session);
+std::string plan_text(const v1::Plan& plan);
+
+}  // namespace weft::client

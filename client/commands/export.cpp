@@ -1,0 +1,78 @@
+#include "client/exports/export.h"
+
+#include <fmt/format.h>
+
+#include "client/commands/commands.h"
+#include "client/output/status.h"
+#include "client/output/text.h"
+
+namespace weft::client {
+namespace {
+
+struct Options {
+  std::string recording;
+  std::string frames;
+  ExportOrder order;
+};
+
+std::int64_t read_frame_number(const std::string& text, const std::string& range) {
+  if (text.empty() || text.size() > 18 ||
+      text.find_first_not_of("0123456789") != std::string::npos) {
+    throw usage_problem("--frames " + range + ": write A:B, A: or :B");
+  }
+  return std::stoll(text);
+}
+
+// "A:B", both included; either may be left out.
+void read_range(const std::string& range, ExportOrder& order) {
+  const std::size_t colon = std::min(range.find(':'), range.size());
+  const std::string first = range.substr(0, colon);
+  const std::string last = colon < range.size() ? range.substr(colon + 1) : first;
+  if (!first.empty() || last.empty()) order.first_frame = read_frame_number(first, range);
+  if (!last.empty()) order.last_frame = read_frame_number(last, range);
+}
+
+void run(Context& context, const Options& options) {
+  ExportOrder order = options.order;
+  if (!options.frames.empty()) read_range(options.frames, order);
+  RecordingReader recording(options.recording);
+  Status status(context.terminal.err, context.terminal.err_is_watched);
+  const ExportResult result = export_recording(recording, order, [&](const ExportResult& so_far) {
+    status.show({fmt::format("{}: {}", order.path, count_of(so_far.frames, "frame"))});
+  });
+  status.clear();
+  context.answer(
+      {{"output", order.path}, {"frames", result.frames}, {"particles", result.particles}},
+      fmt::format("{}: {} of {}\n", order.path, count_of(result.frames, "frame"),
+                  count_of(result.particles, "particle")));
+}
+
+}  // namespace
+
+void add_export(CLI::App& app, Context& context) {
+  const std::map<std::string, ExportFormat> formats{
+      {"obj", ExportFormat::kObj}, {"pc2", ExportFormat::kPc2}, {"csv", ExportFormat::kCsv}};
+  auto options = std::make_shared<Options>();
+  ExportOrder& order = options->order;
+  CLI::App* command =
+      app.add_subcommand("export", "Write a recording as files that other tools open");
+  command->add_option("FILE", options->recording, "Recording")->required();
+  command
+      ->add_option("-f,--format", order.format,
+                   "obj: a directory of meshes; pc2: point cache; csv: a row for every frame")
+      ->required()
+      ->transform(CLI::CheckedTransformer(formats).description("obj|pc2|csv"));
+  command->add_option("-o,--output", order.path, "File to write; for obj a directory")->required();
+  command->add_option("--sheet", order.sheet, "This sheet only; else all, in scene order");
+  auto* frames =
+      command->add_option("--frames", options->frames, "Frames A to B; either may be left out")
+          ->type_name("A:B");
+  command
+      ->add_option("--times", order.times_s,
+                   "Frames at these simulated times instead, s: 0.05,0.1,...")
+      ->delimiter(',')
+      ->excludes(frames);
+  command->callback([&context, options] { run(context, *options); });
+}
+
+}  // namespace weft::client

@@ -1,0 +1,125 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "client/commands/commands.h"
+#include "client/output/status.h"
+#include "client/output/text.h"
+#include "client/recording/reader.h"
+#include "client/recording/tally.h"
+
+namespace weft::client {
+namespace {
+
+struct Findings {
+  Tally tally;
+  std::vector<Violation> damage;
+};
+
+// Reads every frame; each that cannot be read, or is not there, is damage.
+Findings examine(RecordingReader& recording, Status& status) {
+  Findings findings;
+  for (const auto& text : recording.find_damage()) findings.damage.push_back({"file", text});
+  std::int64_t expected = recording.header().start_frame();
+  while (const auto number = recording.find_from(expected)) {
+    if (*number != expected)
+      findings.damage.push_back({fmt::format("frame {}", expected), "missing"});
+    try {
+      findings.tally.add(recording.read(*number));
+    } catch (const Problem& problem) {
+      findings.damage.push_back({fmt::format("frame {}", *number), problem.what()});
+    }
+    expected = *number + 1;
+    status.show({fmt::format("checking frame {}", *number)});
+  }
+  return findings;
+}
+
+std::string sheets_text(const v1::StreamHeader& header) {
+  std::string text;
+  for (const auto& sheet : header.sheets()) {
+    text += fmt::format("{}{} ({} x {} particles)", text.empty() ? "" : ", ", sheet.name(),
+                        sheet.rows(), sheet.columns());
+  }
+  return text;
+}
+
+std::string facts_text(const RecordingReader& recording, const Findings& findings) {
+  const v1::StreamHeader& header = recording.header();
+  const Tally& tally = findings.tally;
+  const bool doubles = header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
+  Facts facts;
+  facts.add("recording", recording.path())
+      .add("recorded", recording.recorded_at())
+      .add("session", header.session())
+      .add("uid", header.uid())
+      .add("numerics", header.numerics_id())
+      .add("sheets", sheets_text(header))
+      .add("content",
+           fmt::format("positions{}, {}", header.format().velocities() ? ", velocities" : "",
+                       doubles ? "float64" : "float32"))
+      .add("frame step", seconds_text(header.frame_step_s()))
+      .add("frames", tally.frames == 0 ? "none"
+                                       : fmt::format("{} ({} to {})", tally.frames,
+                                                     tally.first_frame, tally.last_frame));
+  if (tally.frames > 0) {
+    facts
+        .add("simulated time",
+             fmt::format("{:.6g} s to {:.6g} s", tally.first_time_s, tally.last_time_s))
+        .add("largest strain", percent_text(tally.largest_strain))
+        .add("kinetic energy", number_text(tally.last_stats.kinetic_energy_j()) + " J at the end")
+        .add("potential energy",
+             number_text(tally.last_stats.potential_energy_j()) + " J at the end")
+        .add("at rest", tally.last_stats.at_rest() ? "yes" : "no");
+  }
+  facts
+      .add("file size",
+           bytes_text(static_cast<std::int64_t>(std::filesystem::file_size(recording.path()))))
+      .add("checksums", findings.damage.empty()
+                            ? "all right"
+                            : count_of(static_cast<std::int64_t>(findings.damage.size()), "fault"));
+  return facts.text();
+}
+
+Json facts_json(const RecordingReader& recording, const Findings& findings) {
+  const Tally& tally = findings.tally;
+  return {{"file", recording.path()},
+          {"bytes", std::filesystem::file_size(recording.path())},
+          {"recorded_at", recording.recorded_at()},
+          {"header", to_json(recording.header())},
+          {"frames", tally.frames},
+          {"first_frame", tally.first_frame},
+          {"last_frame", tally.last_frame},
+          {"first_time_s", tally.first_time_s},
+          {"last_time_s", tally.last_time_s},
+          {"substeps", tally.substeps},
+          {"largest_strain", tally.largest_strain},
+          {"last_stats", to_json(tally.last_stats)},
+          {"faults", findings.damage.size()}};
+}
+
+void run(Context& context, const std::string& path) {
+  RecordingReader recording(path);
+  Status status(context.terminal.err, context.terminal.err_is_watched);
+  const Findings findings = examine(recording, status);
+  status.clear();
+  context.answer(facts_json(recording, findings), facts_text(recording, findings));
+  if (!findings.damage.empty()) {
+    Problem problem =
+        damaged(path, count_of(static_cast<std::int64_t>(findings.damage.size()), "fault"));
+    problem.violations = findings.damage;
+    throw problem;
+  }
+}
+
+}  // namespace
+
+void add_info(CLI::App& app, Context& context) {
+  auto path = std::make_shared<std::string>();
+  CLI::App* command =
+      app.add_subcommand("info", "Say what a recording holds, and check every frame of it");
+  command->add_option("FILE", *path, "Recording")->required();
+  command->callback([&context, path] { run(context, *path); });
+}
+
+}  // namespace weft::client

@@ -1,0 +1,109 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "client/commands/commands.h"
+#include "client/output/pace.h"
+#include "client/output/status.h"
+#include "client/output/text.h"
+#include "client/recording/recorder.h"
+
+namespace weft::client {
+namespace {
+
+struct Options {
+  RecordingOrder order;
+  bool force = false;
+  std::int64_t patience_s = 60;
+};
+
+std::string progress_text(const RecordingOrder& order, const Tally& tally, double pace) {
+  if (tally.frames == 0) return "waiting for the first frame";
+  std::string text = fmt::format("frame {}  {:.3f} s  {:.2f} x real time  {}", tally.last_frame,
+                                 tally.last_time_s, pace, bytes_text(tally.bytes));
+  if (order.to && *order.to > tally.first_frame) {
+    const auto done = static_cast<double>(tally.last_frame - tally.first_frame);
+    text = bar(done / static_cast<double>(*order.to - tally.first_frame)) + "  " + text;
+  }
+  return text;
+}
+
+void remove_old(const std::string& path) {
+  for (const char* suffix : {"", "-journal"}) std::filesystem::remove(path + suffix);
+}
+
+void answer(Context& context, const RecordingOrder& order, const RecordingResult& result) {
+  const Tally& tally = result.tally;
+  const Json json{{"file", order.path},
+                  {"session", order.session},
+                  {"complete", result.complete},
+                  {"frames", tally.frames},
+                  {"first_frame", tally.first_frame},
+                  {"last_frame", tally.last_frame},
+                  {"last_time_s", tally.last_time_s},
+                  {"substeps", tally.substeps},
+                  {"largest_strain", tally.largest_strain},
+                  {"at_rest", tally.last_stats.at_rest()},
+                  {"reconnections", result.reconnections}};
+  std::string text = fmt::format("{}: {}", order.path, count_of(tally.frames, "frame"));
+  if (tally.frames > 0) {
+    text += fmt::format(", {} to {}, up to {:.6g} s{}, largest strain {}", tally.first_frame,
+                        tally.last_frame, tally.last_time_s,
+                        tally.last_stats.at_rest() ? " (at rest)" : "",
+                        percent_text(tally.largest_strain));
+  }
+  if (result.reconnections > 0)
+    text += fmt::format(", connected again {}", count_of(result.reconnections, "time"));
+  context.answer(json, text + '\n');
+}
+
+void run(Context& context, const Options& options) {
+  RecordingOrder order = options.order;
+  order.session = context.session_name(order.session);
+  order.run = order.run || context.embedded;
+  order.patience = std::chrono::seconds(options.patience_s);
+  if (options.force) remove_old(order.path);
+
+  Pace pace;
+  Status status(context.terminal.err, context.terminal.err_is_watched);
+  const RecordingResult result = record(context.connection(), order, [&](const Tally& tally) {
+    status.show({progress_text(order, tally, pace.update(tally.last_time_s))});
+  });
+  status.clear();
+  answer(context, order, result);
+  const bool has_end = order.to || order.until_rest;
+  if (has_end && !result.complete) throw interrupted();
+}
+
+}  // namespace
+
+void add_record(CLI::App& app, Context& context) {
+  const std::map<std::string, v1::FrameEncoding> encodings{{"float32", v1::FRAME_ENCODING_FLOAT32},
+                                                           {"float64", v1::FRAME_ENCODING_FLOAT64}};
+  auto options = std::make_shared<Options>();
+  RecordingOrder& order = options->order;
+  CLI::App* command =
+      app.add_subcommand("record", "Record the frames of a session to a file, losing none");
+  add_session_argument(*command, order.session);
+  command->add_option("-o,--output", order.path, "Recording to write; it must not exist")
+      ->required();
+  command->add_option("--from", order.from, "First frame; else the newest");
+  command->add_option("--to", order.to, "End after this frame");
+  command->add_flag("--until-rest", order.until_rest, "End at rest");
+  command->add_flag("--run", order.run,
+                    "Let the session run, as far as it is recorded (always with --embedded)");
+  command->add_flag("--velocities", order.velocities, "Velocities too");
+  command->add_option("--encoding", order.encoding, "Numbers in the file [float32]")
+      ->transform(CLI::CheckedTransformer(encodings).description("float32|float64"));
+  command
+      ->add_option("--patience", options->patience_s,
+                   "Seconds to try again after a connection broke")
+      ->capture_default_str();
+  command->add_flag("--force", options->force, "Replace a file that exists");
+  command->footer(
+      "Without --to and --until-rest it ends when the session, having advanced, is paused again.\n"
+      "Ctrl-C ends it at any time; the file holds what came so far.");
+  command->callback([&context, options] { run(context, *options); });
+}
+
+}  // namespace weft::client

@@ -1,0 +1,39 @@
+#include <fmt/format.h>
+
+#include "client/commands/commands.h"
+#include "client/output/text.h"
+
+namespace weft::client {
+namespace {
+
+struct Options {
+  std::string session;
+  std::int64_t frames = 1;
+  std::optional<std::int64_t> expected_frame;
+};
+
+void run(Context& context, const Options& options) {
+  v1::StepSessionRequest request;
+  request.set_name(context.session_name(options.session));
+  request.set_frames(options.frames);
+  if (options.expected_frame) request.set_expected_frame(*options.expected_frame);
+  const auto response = context.connection().call(&Sessions::StepSession, request);
+  context.answer(to_json(response),
+                 fmt::format("frame {}, {}{}\n", response.frame(), seconds_text(response.time_s()),
+                             response.at_rest() ? ", at rest" : ""));
+}
+
+}  // namespace
+
+void add_step(CLI::App& app, Context& context) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command =
+      app.add_subcommand("step", "Compute frames of a paused session and wait for them");
+  add_session_argument(*command, options->session);
+  command->add_option("--frames", options->frames, "How many")->capture_default_str();
+  command->add_option("--expected-frame", options->expected_frame,
+                      "Refuse unless this is the newest frame");
+  command->callback([&context, options] { run(context, *options); });
+}
+
+}  // namespace weft::client

@@ -1,0 +1,153 @@
+#include <fmt/format.h>
+#include <google/protobuf/util/field_mask_util.h>
+
+#include <charconv>
+
+#include "client/commands/commands.h"
+#include "client/output/text.h"
+
+namespace weft::client {
+namespace {
+
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+
+void run_list(Context& context) {
+  const auto all = context.connection().call(&Textiles::ListTextiles, v1::ListTextilesRequest());
+  Table table({"NAME", "TEXTILE", "kg/m^2", "STATUS"});
+  for (const auto& textile : all.textiles()) {
+    const std::string name = textile.name().substr(textile.name().find('/') + 1);
+    const std::string lacks = textile.missing().empty()
+                                  ? ""
+                                  : fmt::format("incomplete: {} missing", textile.missing_size());
+    table.add({name, textile.display_name(),
+               number_text(textile.values().areal_density_kg_per_m2()),
+               lacks.empty() ? textile.status() : lacks});
+  }
+  context.answer(to_json(all), table.text());
+}
+
+void run_show(Context& context, const std::string& name) {
+  v1::GetTextileRequest request;
+  request.set_name(name.starts_with("textiles/") ? name : "textiles/" + name);
+  const v1::TextilePreset textile = context.connection().call(&Textiles::GetTextile, request);
+  Facts facts;
+  facts.add("textile", textile.display_name())
+      .add("composition", textile.composition())
+      .add("use", textile.typical_use())
+      .add("status", textile.status());
+  if (!textile.missing().empty())
+    facts.add("missing", fmt::format("{}", fmt::join(textile.missing(), ", ")));
+  if (!textile.note().empty()) facts.add("note", textile.note());
+  Table table({"FIELD", "VALUE", "UNIT", "STATUS", "SOURCE"});
+  for (const auto& property : textile.properties()) {
+    table.add({property.field(), property.value(), property.unit(), property.status(),
+               property.source()});
+  }
+  context.answer(to_json(textile), facts.text() + '\n' + table.text());
+}
+
+struct SetOptions {
+  std::string session;
+  std::string sheet;
+  std::string preset;
+  std::vector<std::string> values;  // "raw.bend_n_m2=1e-4"
+};
+
+// "raw.bend_n_m2" of "bend_n_m2", where the sheet's textile is raw.
+std::string full_path(const std::string& field, const v1::Textile& present) {
+  const bool known = field.find('.') != std::string::npos ||
+                     v1::Textile::descriptor()->FindFieldByName(field) != nullptr;
+  if (known) return field;
+  return (present.has_raw() ? "raw." : "measured.") + field;
+}
+
+void set_field(v1::Textile& textile, const std::string& path, double value) {
+  Message* message = &textile;
+  std::string field = path;
+  if (const std::size_t dot = path.find('.'); dot != std::string::npos) {
+    const FieldDescriptor* model = message->GetDescriptor()->FindFieldByName(path.substr(0, dot));
+    if (model == nullptr || model->message_type() == nullptr)
+      throw usage_problem("a textile has no field " + path);
+    message = message->GetReflection()->MutableMessage(message, model);
+    field = path.substr(dot + 1);
+  }
+  const FieldDescriptor* target = message->GetDescriptor()->FindFieldByName(field);
+  if (target == nullptr || target->cpp_type() != FieldDescriptor::CPPTYPE_DOUBLE) {
+    throw usage_problem("a textile has no number " + path);
+  }
+  message->GetReflection()->SetDouble(message, target, value);
+}
+
+double read_number(const std::string& text, const std::string& setting) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) {
+    throw usage_problem("--set " + setting + ": not a number");
+  }
+  return value;
+}
+
+v1::Textile textile_of(Context& context, const std::string& session,
+                       const std::string& sheet_name) {
+  v1::GetSessionRequest request;
+  request.set_name(session);
+  const v1::Session answer = context.connection().call(&Sessions::GetSession, request);
+  for (const auto& sheet : answer.scene().sheets()) {
+    if (sheet_name.empty() || sheet.name() == sheet_name) return sheet.textile();
+  }
+  return {};  // the server will say that there is no such sheet
+}
+
+void run_set(Context& context, const SetOptions& options) {
+  v1::UpdateTextileRequest request;
+  request.set_name(context.session_name(options.session));
+  request.set_sheet(options.sheet);
+  if (!options.preset.empty()) request.mutable_textile()->set_preset(options.preset);
+
+  const v1::Textile present =
+      options.values.empty() ? v1::Textile() : textile_of(context, request.name(), options.sheet);
+  for (const auto& setting : options.values) {
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos)
+      throw usage_problem("--set " + setting + ": write FIELD=VALUE");
+    const std::string path = full_path(setting.substr(0, equals), present);
+    set_field(*request.mutable_textile(), path, read_number(setting.substr(equals + 1), setting));
+    request.mutable_update_mask()->add_paths(path);
+  }
+
+  const auto response = context.connection().call(&Sessions::UpdateTextile, request);
+  context.answer(to_json(response),
+                 fmt::format("applied from frame {}\n{}", response.applied_frame(),
+                             plan_text(response.plan())));
+}
+
+}  // namespace
+
+void add_textile(CLI::App& app, Context& context) {
+  CLI::App* textile =
+      app.add_subcommand("textile", "Show textile presets, change the textile of a session");
+  textile->require_subcommand(1);
+
+  CLI::App* command = textile->add_subcommand("list", "List the presets");
+  command->callback([&context] { run_list(context); });
+
+  auto name = std::make_shared<std::string>();
+  command = textile->add_subcommand("show", "Show a preset, every number with its source");
+  command->add_option("NAME", *name, "Preset, such as denim_11oz")->required();
+  command->callback([&context, name] { run_show(context, *name); });
+
+  auto set = std::make_shared<SetOptions>();
+  command =
+      textile->add_subcommand("set", "Change the textile of a sheet, while the session runs too");
+  add_session_argument(*command, set->session);
+  command->add_option("--sheet", set->sheet, "Sheet to change; may be left out where there is one");
+  CLI::Option_group* what = command->add_option_group("change");
+  what->add_option("--preset", set->preset, "The whole textile from a preset");
+  what->add_option("--set", set->values, "One value, such as bend_n_m2=2e-5; may be given again")
+      ->type_name("FIELD=VALUE");
+  what->require_option(1);
+  command->callback([&context, set] { run_set(context, *set); });
+}
+
+}  // namespace weft::client

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <tuple>
+
+#include "client/problem.h"
+#include "weft/v1/frame.grpc.pb.h"
+#include "weft/v1/server.grpc.pb.h"
+#include "weft/v1/session.grpc.pb.h"
+#include "weft/v1/textile.grpc.pb.h"
+
+namespace weft::client {
+
+inline constexpr const char* kDefaultServer = "127.0.0.1:7311";
+
+// A server to talk to: one that listens somewhere, or one of our own within this process.
+class Connection {
+ public:
+  // A request to stop cancels every call.
+  static std::unique_ptr<Connection> to(const std::string& address, std::stop_token stop);
+  static std::unique_ptr<Connection> embedded(std::stop_token stop);
+  ~Connection();
+
+  // The answer, or a Problem.
+  template <class Stub, class Request, class Response>
+  Response call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                const Request& request) {
+    grpc::ClientContext context;
+    const std::stop_callback cancel(stop_, [&] { context.TryCancel(); });
+    Response response;
+    check((std::get<std::unique_ptr<Stub>>(stubs_).get()->*method)(&context, request, &response));
+    return response;
+  }
+
+  v1::FrameService::Stub& frames() {
+    return *std::get<std::unique_ptr<v1::FrameService::Stub>>(stubs_);
+  }
+  const std::stop_token& stop() const { return stop_; }
+
+  // Throws what is wrong, if anything.
+  void check(const grpc::Status& status) const;
+
+ private:
+  class Embedded;
+  Connection(std::unique_ptr<Embedded> server, std::string address,
+             const std::shared_ptr<grpc::Channel>& channel, std::stop_token stop);
+
+  std::unique_ptr<Embedded> embedded_;
+  std::string address_;
+  std::stop_token stop_;
+  std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,
+             std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>>
+      stubs_;
+};
+
+}  // namespace weft::client

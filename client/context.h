@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "client/connection.h"
+#include "client/output/json.h"
+#include "client/output/terminal.h"
+
+namespace weft::client {
+
+// What every command is given: the options that all have, a connection, and a way to answer.
+class Context {
+ public:
+  Context(const Terminal& given_terminal, std::stop_token given_stop)
+      : terminal(given_terminal), stop(std::move(given_stop)) {}
+
+  Terminal terminal;
+  std::stop_token stop;
+  std::string server = kDefaultServer;
+  bool embedded = false;
+  bool json = false;
+
+  // Opened when first asked for.
+  Connection& connection();
+  // "sessions/flag" of "flag"; where the server is our own, the session made from that scene file.
+  std::string session_name(const std::string& session);
+
+  // Prints the answer: the document for scripts, the text for people.
+  void answer(const Json& document, const std::string& text);
+  void answer(const Json& document);
+
+ private:
+  std::unique_ptr<Connection> connection_;
+};
+
+}  // namespace weft::client

@@ -1,0 +1,126 @@
+#include "client/exports/export.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <deque>
+#include <optional>
+
+#include "client/exports/frame_writer.h"
+#include "client/problem.h"
+
+namespace weft::client {
+namespace {
+
+constexpr double kSameTime = 1e-9;  // s
+
+std::size_t particles_of(const v1::SheetLayout& sheet) {
+  return static_cast<std::size_t>(sheet.rows()) * static_cast<std::size_t>(sheet.columns());
+}
+
+// The particles that are exported, and their sheets counted from the first of them.
+struct Part {
+  std::vector<v1::SheetLayout> sheets;
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+
+Part find_part(const RecordingReader& recording, const std::string& name) {
+  Part part;
+  std::string names;
+  for (const auto& sheet : recording.header().sheets()) {
+    names += (names.empty() ? "" : ", ") + sheet.name();
+    if (!name.empty() && sheet.name() != name) continue;
+    if (part.sheets.empty()) part.first = static_cast<std::size_t>(sheet.first_particle());
+    part.sheets.push_back(sheet);
+    part.sheets.back().set_first_particle(static_cast<std::int32_t>(part.count));
+    part.count += particles_of(sheet);
+  }
+  if (part.sheets.empty()) {
+    throw usage_problem(
+        fmt::format("{} has no sheet \"{}\"; it has: {}", recording.path(), name, names));
+  }
+  return part;
+}
+
+std::int64_t find_frame_at(RecordingReader& recording, double time_s) {
+  const auto around = recording.find_around(time_s + kSameTime);
+  std::string neighbours;
+  for (const auto& [number, time] : around) {
+    if (std::abs(time - time_s) <= kSameTime) return number;
+    neighbours +=
+        fmt::format("{}frame {} at {:.12g} s", neighbours.empty() ? "" : " and ", number, time);
+  }
+  throw Problem(Exit::kRefused, "OUT_OF_RANGE", "NO_FRAME_AT_TIME",
+                fmt::format("{} has no frame at {:.12g} s; next to it: {}", recording.path(),
+                            time_s, neighbours.empty() ? "nothing" : neighbours));
+}
+
+// Hands out the numbers of the frames that are exported.
+class FrameNumbers {
+ public:
+  FrameNumbers(RecordingReader& recording, const ExportOrder& order)
+      : recording_(recording), next_(order.first_frame), last_(order.last_frame) {
+    for (const double time : order.times_s) at_times_.push_back(find_frame_at(recording, time));
+    by_time_ = !at_times_.empty();
+  }
+
+  std::optional<std::int64_t> next() {
+    std::optional<std::int64_t> number;
+    if (!by_time_) {
+      number = recording_.find_from(next_);
+    } else if (!at_times_.empty()) {
+      number = at_times_.front();
+      at_times_.pop_front();
+    }
+    if (!number || *number > last_) return std::nullopt;
+    next_ = *number + 1;
+    return number;
+  }
+
+ private:
+  RecordingReader& recording_;
+  std::int64_t next_;
+  std::int64_t last_;
+  bool by_time_ = false;
+  std::deque<std::int64_t> at_times_;
+};
+
+std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& part,
+                                         std::int64_t first_frame) {
+  switch (order.format) {
+    case ExportFormat::kObj:
+      return make_obj_writer(order.path, part.sheets);
+    case ExportFormat::kPc2:
+      return make_pc2_writer(order.path, part.count, first_frame);
+    case ExportFormat::kCsv:
+      return make_csv_writer(order.path, part.count);
+  }
+  throw std::logic_error("no such format");
+}
+
+}  // namespace
+
+ExportResult export_recording(RecordingReader& recording, const ExportOrder& order,
+                              const std::function<void(const ExportResult&)>& progress) {
+  const Part part = find_part(recording, order.sheet);
+  FrameNumbers numbers(recording, order);
+  auto number = numbers.next();
+  if (!number) throw usage_problem(fmt::format("{} has none of these frames", recording.path()));
+
+  const auto writer = make_writer(order, part, *number);
+  ExportResult result{.frames = 0, .particles = static_cast<std::int64_t>(part.count)};
+  for (; number; number = numbers.next()) {
+    const v1::Frame frame = recording.read(*number);
+    writer->add({.number = frame.number(),
+                 .time_s = frame.time_s(),
+                 .points = read_points(frame.positions_m(), recording.header().format().encoding(),
+                                       part.first, part.count)});
+    ++result.frames;
+    progress(result);
+  }
+  writer->finish();
+  return result;
+}
+
+}  // namespace weft::client

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/exports/points.h"
+
+namespace weft::client {
+
+// Writes frames in the format of another tool.
+class FrameWriter {
+ public:
+  virtual ~FrameWriter() = default;
+  virtual void add(const ExportFrame& frame) = 0;
+  // Ends the output; without it, it is not whole.
+  virtual void finish() = 0;
+};
+
+// A row for every frame: t, x0, y0, z0, x1 ...
+std::unique_ptr<FrameWriter> make_csv_writer(const std::string& path, std::size_t particles);
+
+// Point cache of Blender, 3ds Max and Marvelous Designer, float32.
+std::unique_ptr<FrameWriter> make_pc2_writer(const std::string& path, std::size_t particles,
+                                             std::int64_t first_frame);
+
+// A directory of files cloth_000123.obj with the cells of the sheets as quads.
+std::unique_ptr<FrameWriter> make_obj_writer(const std::string& directory,
+                                             std::vector<v1::SheetLayout> sheets);
+
+}  // namespace weft::client

@@ -1,0 +1,70 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iterator>
+#include <system_error>
+
+#include "client/exports/frame_writer.h"
+#include "client/exports/output_file.h"
+#include "client/problem.h"
+
+namespace weft::client {
+namespace {
+
+void add_vertices(std::string& text, const Points& points, std::size_t first, std::size_t count) {
+  for (std::size_t i = first; i < first + count; ++i) {
+    fmt::format_to(std::back_inserter(text), "v {:.9g} {:.9g} {:.9g}\n", points.x[i], points.y[i],
+                   points.z[i]);
+  }
+}
+
+// Quads, seen from above a flat sheet anticlockwise; OBJ counts vertices from 1.
+void add_quads(std::string& text, const v1::SheetLayout& sheet) {
+  for (int row = 0; row + 1 < sheet.rows(); ++row) {
+    for (int column = 0; column + 1 < sheet.columns(); ++column) {
+      const int corner = sheet.first_particle() + row * sheet.columns() + column + 1;
+      const int below = corner + sheet.columns();
+      fmt::format_to(std::back_inserter(text), "f {} {} {} {}\n", corner, below, below + 1,
+                     corner + 1);
+    }
+  }
+}
+
+class ObjWriter : public FrameWriter {
+ public:
+  ObjWriter(const std::string& directory, std::vector<v1::SheetLayout> sheets)
+      : directory_(directory), sheets_(std::move(sheets)) {
+    std::error_code error;
+    std::filesystem::create_directories(directory_, error);
+    if (error) throw unwritable(directory, error.message());
+  }
+
+  void add(const ExportFrame& frame) override {
+    std::string text;
+    for (const auto& sheet : sheets_) {
+      text += "o " + sheet.name() + '\n';
+      const auto particles =
+          static_cast<std::size_t>(sheet.rows()) * static_cast<std::size_t>(sheet.columns());
+      add_vertices(text, frame.points, static_cast<std::size_t>(sheet.first_particle()), particles);
+      add_quads(text, sheet);
+    }
+    OutputFile file(directory_ / fmt::format("cloth_{:06}.obj", frame.number));
+    file.write(text);
+    file.close();
+  }
+
+  void finish() override {}
+
+ private:
+  std::filesystem::path directory_;
+  std::vector<v1::SheetLayout> sheets_;
+};
+
+}  // namespace
+
+std::unique_ptr<FrameWriter> make_obj_writer(const std::string& directory,
+                                             std::vector<v1::SheetLayout> sheets) {
+  return std::make_unique<ObjWriter>(directory, std::move(sheets));
+}
+
+}  // namespace weft::client

@@ -1,0 +1,87 @@
+#include "client/frame_feed.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+
+namespace weft::client {
+namespace {
+
+constexpr std::chrono::milliseconds kFirstPause{50};
+constexpr std::chrono::milliseconds kLongestPause{1000};
+
+void wait(std::chrono::milliseconds time, const std::stop_token& stop) {
+  std::mutex mutex;
+  std::unique_lock lock(mutex);
+  std::condition_variable_any().wait_for(lock, stop, time, [] { return false; });
+}
+
+}  // namespace
+
+FrameFeed::FrameFeed(Connection& connection, v1::StreamFramesRequest request,
+                     std::chrono::seconds patience)
+    : connection_(connection), request_(std::move(request)), patience_(patience) {
+  open();
+}
+
+FrameFeed::~FrameFeed() {
+  cancel_.reset();
+  context_->TryCancel();
+}
+
+std::optional<v1::StreamFramesResponse> FrameFeed::next() {
+  for (;;) {
+    v1::StreamFramesResponse message;
+    if (reader_->Read(&message)) {
+      if (note(message)) return message;
+      continue;
+    }
+    const grpc::Status status = reader_->Finish();
+    const bool complete = request_.has_end_frame() && request_.has_start_frame() &&
+                          request_.start_frame() > request_.end_frame();
+    if (status.ok() || complete || connection_.stop().stop_requested()) return std::nullopt;
+    open_again(status);
+  }
+}
+
+void FrameFeed::open() {
+  cancel_.reset();
+  reader_.reset();
+  context_ = std::make_unique<grpc::ClientContext>();
+  cancel_.emplace(connection_.stop(), [context = context_.get()] { context->TryCancel(); });
+  reader_ = connection_.frames().StreamFrames(context_.get(), request_);
+}
+
+// Notes what is wanted next; false for a message the caller has had.
+bool FrameFeed::note(const v1::StreamFramesResponse& message) {
+  last_heard_ = Clock::now();
+  pause_ = kFirstPause;
+  if (message.has_header()) {
+    request_.set_uid(message.header().uid());
+    if (!request_.has_start_frame()) request_.set_start_frame(message.header().start_frame());
+    return !std::exchange(header_seen_, true);
+  }
+  if (message.has_frame()) {
+    if (message.frame().number() != request_.start_frame()) {
+      throw Problem(Exit::kRefused, "INTERNAL", "FRAME_OUT_OF_ORDER",
+                    fmt::format("the server sent frame {} where frame {} was due",
+                                message.frame().number(), request_.start_frame()));
+    }
+    request_.set_start_frame(message.frame().number() + 1);
+  }
+  return true;
+}
+
+void FrameFeed::open_again(const grpc::Status& status) {
+  const bool hopeless =
+      came_from_weftd(status) || !header_seen_ || Clock::now() - last_heard_ > patience_;
+  if (hopeless) connection_.check(status);
+  wait(pause_, connection_.stop());
+  pause_ = std::min(2 * pause_, kLongestPause);
+  ++reconnections_;
+  open();
+}
+
+}  // namespace weft::client

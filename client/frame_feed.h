@@ -1,0 +1,49 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+
+#include "client/connection.h"
+
+namespace weft::client {
+
+// The frames of a session, in order and each once, whatever happens on the road: a stream that
+// breaks is opened again behind the last frame received.
+class FrameFeed {
+ public:
+  // Gives up when nothing was heard for the patience given.
+  FrameFeed(Connection& connection, v1::StreamFramesRequest request, std::chrono::seconds patience);
+  ~FrameFeed();
+  FrameFeed(const FrameFeed&) = delete;
+  FrameFeed& operator=(const FrameFeed&) = delete;
+
+  // The next message, the header first and once. None: the stream has ended as asked, or a stop was
+  // requested. Throws what else ends it.
+  std::optional<v1::StreamFramesResponse> next();
+
+  int reconnections() const { return reconnections_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void open();
+  bool note(const v1::StreamFramesResponse& message);
+  void open_again(const grpc::Status& status);
+
+  Connection& connection_;
+  v1::StreamFramesRequest request_;
+  std::chrono::seconds patience_;
+  bool header_seen_ = false;
+  int reconnections_ = 0;
+  Clock::time_point last_heard_;
+  std::chrono::milliseconds pause_{};
+
+  std::unique_ptr<grpc::ClientContext> context_;
+  std::optional<std::stop_callback<std::function<void()>>> cancel_;
+  std::unique_ptr<grpc::ClientReader<v1::StreamFramesResponse>> reader_;
+};
+
+}  // namespace weft::client

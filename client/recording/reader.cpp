@@ -1,0 +1,79 @@
+#include "client/recording/reader.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/json_util.h>
+
+#include "client/problem.h"
+#include "client/recording/layout.h"
+
+namespace weft::client {
+namespace {
+
+std::int64_t pragma(Database& database, std::string_view name) {
+  Statement statement = database.prepare(fmt::format("PRAGMA {}", name));
+  return statement.step() ? statement.integer(0) : 0;
+}
+
+}  // namespace
+
+RecordingReader::RecordingReader(const std::string& path)
+    : path_(path), database_(path, Database::Access::kRead) {
+  if (pragma(database_, "application_id") != kRecordingId)
+    throw malformed(path, "not a recording of weft");
+  if (pragma(database_, "user_version") != kRecordingVersion)
+    throw malformed(path, "made by another version of weft");
+
+  Statement row = database_.prepare("SELECT scene, header, checksum, recorded_at FROM recording");
+  if (!row.step()) throw damaged(path, "it does not say what it holds");
+  const std::string scene = row.bytes(0);
+  const std::string header = row.bytes(1);
+  const bool sound = row.integer(2) == checksum_of_text(scene, header) &&
+                     google::protobuf::util::JsonStringToMessage(scene, &scene_).ok() &&
+                     google::protobuf::util::JsonStringToMessage(header, &header_).ok();
+  if (!sound) throw damaged(path, "the scene's checksum is wrong");
+  recorded_at_ = row.bytes(3);
+}
+
+std::optional<std::int64_t> RecordingReader::find_from(std::int64_t number) {
+  Statement row =
+      database_.prepare("SELECT number FROM frames WHERE number >= ? ORDER BY number LIMIT 1");
+  if (!row.bind(1, number).step()) return std::nullopt;
+  return row.integer(0);
+}
+
+v1::Frame RecordingReader::read(std::int64_t number) {
+  Statement row = database_.prepare("SELECT time_s, frame, checksum FROM frames WHERE number = ?");
+  if (!row.bind(1, number).step()) {
+    throw Problem(Exit::kFile, "NOT_FOUND", "FRAME_MISSING",
+                  fmt::format("{} has no frame {}", path_, number));
+  }
+  const std::string bytes = row.bytes(1);
+  v1::Frame frame;
+  const bool sound = row.integer(2) == checksum_of_frame(header_.uid(), number, bytes) &&
+                     frame.ParseFromString(bytes) && frame.number() == number &&
+                     frame.time_s() == row.real(0);
+  if (!sound) throw damaged(path_, fmt::format("the checksum of frame {} is wrong", number));
+  return frame;
+}
+
+std::vector<std::pair<std::int64_t, double>> RecordingReader::find_around(double time_s) {
+  std::vector<std::pair<std::int64_t, double>> found;
+  for (const char* sql :
+       {"SELECT number, time_s FROM frames WHERE time_s <= ? ORDER BY number DESC LIMIT 1",
+        "SELECT number, time_s FROM frames WHERE time_s > ? ORDER BY number LIMIT 1"}) {
+    Statement row = database_.prepare(sql);
+    if (row.bind(1, time_s).step()) found.emplace_back(row.integer(0), row.real(1));
+  }
+  return found;
+}
+
+std::vector<std::string> RecordingReader::find_damage() {
+  std::vector<std::string> damage;
+  Statement row = database_.prepare("PRAGMA integrity_check(10)");
+  while (row.step()) {
+    if (const std::string text = row.bytes(0); text != "ok") damage.push_back(text);
+  }
+  return damage;
+}
+
+}  // namespace weft::client

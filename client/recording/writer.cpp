@@ -1,0 +1,82 @@
+#include "client/recording/writer.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "client/output/json.h"
+#include "client/problem.h"
+#include "client/recording/layout.h"
+
+namespace weft::client {
+namespace {
+
+constexpr std::chrono::milliseconds kCommitInterval{500};
+constexpr std::size_t kCommitBytes = 32 << 20;
+
+Database create(const std::string& path) {
+  if (std::filesystem::exists(path)) throw unwritable(path, "the file exists");
+  Database database(path, Database::Access::kCreate);
+  // a rollback journal, and no page written before its commit: the file alone is a whole recording
+  database.execute(
+      "PRAGMA journal_mode = DELETE; PRAGMA synchronous = NORMAL; PRAGMA cache_spill = 0");
+  return database;
+}
+
+void describe(Database& database, const v1::Scene& scene, const v1::StreamHeader& header) {
+  const std::string scene_json = to_json(scene, Defaults::kLeftOut).dump();
+  const std::string header_json = to_json(header, Defaults::kLeftOut).dump();
+  database.execute(fmt::format("BEGIN; PRAGMA application_id = {}; PRAGMA user_version = {}; {}",
+                               kRecordingId, kRecordingVersion, kRecordingTables)
+                       .c_str());
+  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+  database.prepare("INSERT INTO recording VALUES (?, ?, ?, ?, ?)")
+      .bind_text(1, WEFT_VERSION)
+      .bind_text(2, fmt::format("{:%FT%TZ}", fmt::gmtime(now)))
+      .bind_text(3, scene_json)
+      .bind_text(4, header_json)
+      .bind(5, checksum_of_text(scene_json, header_json))
+      .step();
+  database.execute("COMMIT");
+}
+
+}  // namespace
+
+RecordingWriter::RecordingWriter(const std::string& path, const v1::Scene& scene,
+                                 const v1::StreamHeader& header)
+    : uid_(header.uid()),
+      database_(create(path)),
+      insert_((describe(database_, scene, header),
+               database_.prepare("INSERT INTO frames VALUES (?, ?, ?, ?)"))),
+      last_commit_(Clock::now()) {}
+
+RecordingWriter::~RecordingWriter() {
+  try {
+    commit();
+  } catch (const Problem&) {
+    // the frames committed before stay readable
+  }
+}
+
+void RecordingWriter::add(const v1::Frame& frame) {
+  const std::string bytes = frame.SerializeAsString();
+  if (!std::exchange(pending_, true)) database_.execute("BEGIN");
+  insert_.bind(1, frame.number())
+      .bind(2, frame.time_s())
+      .bind_bytes(3, bytes)
+      .bind(4, checksum_of_frame(uid_, frame.number(), bytes))
+      .step();
+  insert_.reset();
+
+  pending_bytes_ += bytes.size();
+  if (pending_bytes_ > kCommitBytes || Clock::now() - last_commit_ > kCommitInterval) commit();
+}
+
+void RecordingWriter::commit() {
+  if (std::exchange(pending_, false)) database_.execute("COMMIT");
+  pending_bytes_ = 0;
+  last_commit_ = Clock::now();
+}
+
+}  // namespace weft::client

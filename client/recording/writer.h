@@ -1,0 +1,37 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "client/recording/database.h"
+#include "weft/v1/frame.pb.h"
+#include "weft/v1/scene.pb.h"
+
+namespace weft::client {
+
+// Writes a recording. What is committed stays readable, whatever becomes of this process.
+class RecordingWriter {
+ public:
+  // The file must not exist.
+  RecordingWriter(const std::string& path, const v1::Scene& scene, const v1::StreamHeader& header);
+  // Commits what it can.
+  ~RecordingWriter();
+  RecordingWriter(const RecordingWriter&) = delete;
+  RecordingWriter& operator=(const RecordingWriter&) = delete;
+
+  // Commits twice a second.
+  void add(const v1::Frame& frame);
+  void commit();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  std::string uid_;
+  Database database_;
+  Statement insert_;
+  bool pending_ = false;
+  std::size_t pending_bytes_ = 0;
+  Clock::time_point last_commit_;
+};
+
+}  // namespace weft::client

@@ -1,0 +1,87 @@
+#include "client/scene_file.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <regex>
+#include <sstream>
+#include <tuple>
+
+#include "client/output/json.h"
+#include "client/problem.h"
+
+namespace weft::client {
+namespace {
+
+std::string read_text(const std::string& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file || !text) throw unreadable(path, std::strerror(errno));
+  return text.str();
+}
+
+// "line 3, column 7: ..." of the JSON parser's "[json...] parse error at line 3, column 7: ..."
+void check_syntax(const std::string& path, const std::string& text) {
+  try {
+    std::ignore = Json::parse(text);
+  } catch (const Json::parse_error& error) {
+    const std::string_view what = error.what();
+    const std::size_t line = what.find("line ");
+    throw malformed(path, line == std::string_view::npos ? what : what.substr(line));
+  }
+}
+
+// Line of a word that stands in quotes just once, as ", line 7".
+std::string line_of(const std::string& word, const std::string& text) {
+  const std::string quoted = '"' + word + '"';
+  const std::size_t place = text.find(quoted);
+  if (place == std::string::npos || text.find(quoted, place + 1) != std::string::npos) return {};
+  return fmt::format(
+      ", line {}",
+      1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(place), '\n'));
+}
+
+}  // namespace
+
+v1::Scene read_scene(const std::string& path) {
+  const std::string text = read_text(path);
+  check_syntax(path, text);
+  v1::Scene scene;
+  const auto status = google::protobuf::util::JsonStringToMessage(text, &scene);
+  if (status.ok()) return scene;
+
+  // protobuf says "(sheets[0].grid) rowz: Cannot find field."
+  const std::string message(status.message());
+  static const std::regex kPlaced(R"(^\(?([^) ]*)\)?:? (\w+): (Cannot find field\.)$)");
+  std::smatch match;
+  if (std::regex_match(message, match, kPlaced)) {
+    const std::string parent = match[1];
+    throw malformed(
+        path + line_of(match[2], text),
+        fmt::format("no such field: {}{}{}", parent, parent.empty() ? "" : ".", match[2].str()));
+  }
+  throw malformed(path, message);
+}
+
+v1::Session create_session(Connection& connection, const std::string& path,
+                           v1::CreateSessionRequest request) try {
+  *request.mutable_session()->mutable_scene() = read_scene(path);
+  return connection.call(&v1::SessionService::Stub::CreateSession, request);
+} catch (Problem& problem) {
+  constexpr std::string_view kPrefix = "session.scene.";
+  for (auto& violation : problem.violations) {
+    if (violation.field.starts_with(kPrefix)) violation.field.erase(0, kPrefix.size());
+  }
+  throw;
+}
+
+std::string scene_text(const v1::Scene& scene) {
+  return to_json(scene, Defaults::kLeftOut).dump(2) + '\n';
+}
+
+}  // namespace weft::client

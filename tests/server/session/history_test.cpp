@@ -1,0 +1,75 @@
+#include "server/session/history.h"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+
+namespace weft {
+namespace {
+
+constexpr auto kKeepNone = std::numeric_limits<std::int64_t>::max();
+
+std::shared_ptr<const Frame> frame(std::int64_t number) {
+  auto made = std::make_shared<Frame>();
+  made->number = number;
+  made->positions.resize(30);
+  made->velocities.resize(30);
+  return made;
+}
+
+const std::size_t kFrameBytes = frame(0)->bytes();
+
+TEST(History, DropsTheOldestFramesThatDoNotFit) {
+  History history(5 * kFrameBytes);
+  for (int i = 0; i < 100; ++i) history.push(frame(i), kKeepNone);
+  EXPECT_EQ(history.oldest(), 95);
+  EXPECT_EQ(history.latest()->number, 99);
+  EXPECT_EQ(history.find(94), nullptr);
+  EXPECT_EQ(history.find(97)->number, 97);
+  EXPECT_EQ(history.find(100), nullptr);
+}
+
+TEST(History, KeepsTwoFramesHoweverLargeTheyAre) {
+  History history(1);
+  for (int i = 0; i < 5; ++i) history.push(frame(i), kKeepNone);
+  EXPECT_EQ(history.oldest(), 3);
+  EXPECT_TRUE(history.full());
+}
+
+TEST(History, KeepsWhatItIsAskedToKeep) {
+  History history(3 * kFrameBytes);
+  for (int i = 0; i < 10; ++i) history.push(frame(i), 4);
+  EXPECT_EQ(history.oldest(), 4);
+}
+
+TEST(History, CountsTheEncodingsOfItsFrames) {
+  History history(5 * kFrameBytes);
+  for (int i = 0; i < 5; ++i) history.push(frame(i), kKeepNone);
+  EXPECT_EQ(history.oldest(), 0);
+  history.latest()->encodings.get(0, [] {
+    return Encoding{std::make_shared<int>(1), 2 * kFrameBytes};
+  });
+  history.push(frame(5), kKeepNone);
+  EXPECT_EQ(history.oldest(), 3) << "two frames of room went to the encoding";
+}
+
+TEST(EncodingCache, MakesEachEncodingOnceAndLetsItGoWithTheFrame) {
+  std::weak_ptr<const void> held;
+  {
+    const auto made = frame(0);
+    int calls = 0;
+    const auto make = [&] {
+      ++calls;
+      return Encoding{std::make_shared<int>(calls), 4};
+    };
+    const auto one = made->encodings.get(7, make);
+    EXPECT_EQ(made->encodings.get(7, make), one);
+    EXPECT_EQ(calls, 1);
+    EXPECT_NE(made->encodings.get(8, make), one);
+    held = one;
+  }
+  EXPECT_TRUE(held.expired());
+}
+
+}  // namespace
+}  // namespace weft

@@ -1,0 +1,244 @@
+#include "server/session/session.h"
+
+#include <gmock/gmock.h>
+
+#include <thread>
+
+#include "tests/server/session/session_bench.h"
+
+namespace weft::testing {
+namespace {
+
+using namespace std::chrono_literals;
+
+Answer set_bend(Session& session, double bend) {
+  SetTextile command;
+  command.edit = [bend](const Textile& current) {
+    Textile edited = current;
+    std::get<RawTextile>(edited.model).bend = bend;
+    return edited;
+  };
+  return {session, command};
+}
+
+TEST(Session, BeginsPausedAtFrame0) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  EXPECT_EQ(session->status().state, SessionState::kPaused);
+  EXPECT_EQ(session->status().newest->number, 0);
+  EXPECT_NE(session->uid(), make_session(scheduler)->uid());
+}
+
+TEST(Session, StepsAsManyFramesAsAskedAndAnswersWhenTheyExist) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const Applied first = step(*session, 3).applied();
+  EXPECT_EQ(first.frame, 1);
+  EXPECT_EQ(first.newest->number, 3);
+  const Applied second = step(*session, 2).applied();
+  EXPECT_EQ(second.frame, 4);
+  EXPECT_EQ(session->status().newest->number, 5);
+}
+
+TEST(Session, CarriesOutStepsOneAfterTheOther) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  Answer first = step(*session, 50), second = step(*session, 7);
+  EXPECT_EQ(second.applied().frame, 51);
+  EXPECT_TRUE(first.is_there());
+  EXPECT_EQ(session->status().newest->number, 57);
+}
+
+TEST(Session, ComputesTheFramesThatTheSolverAloneComputes) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const auto newest = step(*session, 20).applied().newest;
+  Simulation alone(hung_scene());
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(alone.advance_frame());
+  std::vector<double> positions(newest->positions.size());
+  alone.copy_positions(positions);
+  EXPECT_EQ(newest->positions, positions);
+}
+
+TEST(Session, RefusesAStepThatExpectsAnotherFrame) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  step(*session, 3).applied();
+  StepCommand command;
+  command.expected_frame = 2;
+  EXPECT_EQ(Answer(*session, command).refused(), Refusal::Why::kStale);
+  command.expected_frame = 3;
+  EXPECT_EQ(Answer(*session, command).applied().frame, 4);
+}
+
+TEST(Session, RunsUntilAFrameAndPausesThere) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const auto watcher = Watcher::of(*session, 0);
+  EXPECT_EQ(run(*session, 40).applied().frame, 1);
+  watcher->wait_for_frame(40);
+  EXPECT_EQ(session->status().state, SessionState::kPaused);
+  EXPECT_EQ(session->status().newest->number, 40);
+  EXPECT_EQ(run(*session, 40).refused(), Refusal::Why::kNotAhead);
+}
+
+TEST(Session, RunsUntilRestAndPausesThere) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const auto watcher = Watcher::of(*session, 0);
+  RunCommand command;
+  command.until_rest = true;
+  Answer(*session, command).applied();
+  watcher->wait_for_state(SessionState::kPaused);
+  EXPECT_TRUE(session->status().newest->at_rest);
+}
+
+TEST(Session, RunsUntilItIsPaused) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const auto watcher = Watcher::of(*session, 0);
+  run(*session).applied();
+  watcher->wait_for_frame(10);
+  EXPECT_EQ(step(*session, 1).refused(), Refusal::Why::kRunning);
+  const Applied paused = pause(*session).applied();
+  EXPECT_EQ(paused.frame, paused.newest->number + 1);
+  EXPECT_EQ(session->status().state, SessionState::kPaused);
+  EXPECT_EQ(session->status().newest->number, paused.newest->number) << "it went on";
+}
+
+TEST(Session, RunsNoFasterThanItsPace) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const auto watcher = Watcher::of(*session, 0);
+  const auto begin = Clock::now();
+  RunCommand command;
+  command.time_scale = 2;
+  command.until_frame = 12;
+  Answer(*session, command).applied();
+  watcher->wait_for_frame(12);
+  EXPECT_GE(Clock::now() - begin, 100ms) << "12 frames of 1/60 s at double speed take 0.1 s";
+}
+
+TEST(Session, APacedSessionAnswersCallsBetweenItsFrames) {
+  Scheduler scheduler(1);
+  const auto session = make_session(scheduler);
+  RunCommand command;
+  command.time_scale = 1e-3;  // a frame in 17 s
+  Answer(*session, command).applied();
+  EXPECT_EQ(set_bend(*session, 2e-5).applied().frame, 1);
+  EXPECT_EQ(pause(*session).applied().frame, 1);
+}
+
+TEST(Session, ChangesATextileFromTheNextFrameOn) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  step(*session, 5).applied();
+  EXPECT_EQ(set_bend(*session, 1e-3).applied().frame, 6);
+  const auto newest = step(*session, 5).applied().newest;
+  EXPECT_EQ(std::get<RawTextile>(session->status().textiles[0].model).bend, 1e-3);
+
+  Simulation alone(hung_scene());
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(alone.advance_frame());
+  Textile textile = alone.scene().sheets[0].textile;
+  std::get<RawTextile>(textile.model).bend = 1e-3;
+  ASSERT_FALSE(alone.set_textile(0, textile));
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(alone.advance_frame());
+  std::vector<double> positions(newest->positions.size());
+  alone.copy_positions(positions);
+  EXPECT_EQ(newest->positions, positions);
+}
+
+TEST(Session, AnEditThatFindsProblemsChangesNothing) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  SetTextile command;
+  command.edit = [](const Textile&) { return std::vector<Problem>{{"raw", "bad"}}; };
+  const Outcome outcome = Answer(*session, command).outcome();
+  ASSERT_TRUE(std::holds_alternative<Refusal>(outcome));
+  EXPECT_EQ(std::get<Refusal>(outcome).problems.size(), 1u);
+  EXPECT_EQ(std::get<RawTextile>(session->status().textiles[0].model).bend, 1e-5);
+}
+
+TEST(Session, PausingInterruptsAStep) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const auto watcher = Watcher::of(*session, 0);
+  Answer endless = step(*session, 1'000'000'000);
+  watcher->wait_for_frame(5);
+  pause(*session).applied();
+  EXPECT_EQ(endless.refused(), Refusal::Why::kInterrupted);
+}
+
+TEST(Session, AStepEndsWithItsCaller) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const auto watcher = Watcher::of(*session, 0);
+  std::stop_source caller;
+  StepCommand command;
+  command.frames = 1'000'000'000;
+  command.cancelled = caller.get_token();
+  Answer endless(*session, command);
+  watcher->wait_for_frame(5);
+  caller.request_stop();
+  session->wake();
+  EXPECT_EQ(endless.refused(), Refusal::Why::kCancelled);
+  EXPECT_GT(step(*session, 1).applied().frame, 5) << "the session is fine";
+}
+
+TEST(Session, ASolverThatDivergesFailsTheSessionAndItsGoodFramesStay) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler, diverging_scene());
+  EXPECT_EQ(step(*session, 100'000).refused(), Refusal::Why::kFailed);
+  const SessionStatus status = session->status();
+  EXPECT_EQ(status.state, SessionState::kFailed);
+  EXPECT_THAT(status.failure,
+              ::testing::HasSubstr("frame " + std::to_string(status.newest->number + 1)));
+  for (const double value : status.newest->positions) ASSERT_TRUE(std::isfinite(value));
+  EXPECT_EQ(run(*session).refused(), Refusal::Why::kFailed);
+  EXPECT_EQ(step(*session, 1).refused(), Refusal::Why::kFailed);
+  EXPECT_EQ(set_bend(*session, 1e-4).refused(), Refusal::Why::kFailed);
+}
+
+TEST(Session, ClosingAnswersEveryCommandThatWaits) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const auto watcher = Watcher::of(*session, 0);
+  Answer endless = step(*session, 1'000'000'000), waiting = step(*session, 1);
+  watcher->wait_for_frame(3);
+  session->close(Refusal::Why::kDeleted);
+  EXPECT_EQ(endless.refused(), Refusal::Why::kDeleted);
+  EXPECT_EQ(waiting.refused(), Refusal::Why::kDeleted);
+  EXPECT_EQ(step(*session, 1).refused(), Refusal::Why::kDeleted);
+}
+
+TEST(Session, RefusesCommandsWhenTooManyWait) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  std::vector<Answer> answers;
+  for (std::size_t i = 0; i <= Session::kMaxCommands; ++i) {
+    answers.push_back(step(*session, 1'000'000'000));
+  }
+  EXPECT_EQ(answers.back().refused(), Refusal::Why::kBusy);
+  session->close(Refusal::Why::kDeleted);
+  EXPECT_EQ(answers.front().refused(), Refusal::Why::kDeleted);
+}
+
+TEST(Session, TakesCallsFromManyThreadsAtOnce) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  constexpr int kThreads = 8, kCalls = 20;
+  std::vector<std::jthread> callers;
+  for (int i = 0; i < kThreads; ++i) {
+    callers.emplace_back([&] {
+      for (int k = 0; k < kCalls; ++k) {
+        step(*session, 1).applied();
+        set_bend(*session, 1e-5 * (1 + k)).applied();
+      }
+    });
+  }
+  callers.clear();
+  EXPECT_EQ(session->status().newest->number, kThreads * kCalls);
+}
+
+}  // namespace
+}  // namespace weft::testing

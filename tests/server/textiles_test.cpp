@@ -13,10 +13,10 @@
 namespace weft {
 namespace {
 
-using testing::AnyOf;
-using testing::ElementsAre;
-using testing::IsEmpty;
-using testing::Not;
+using ::testing::AnyOf;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::Not;
 using Row = std::map<std::string, std::string>;
 
 // Fields of a line of CSV, quotes taken off.
@@ -153,7 +153,7 @@ TEST(Textiles, have_the_values_that_their_rows_give_and_list_the_missing_ones) {
       EXPECT_NEAR(values.at(field), value, 5e-5 * value) << preset.name() << ' ' << field;
       if (value == 0 && field != "air_drag_kg_per_m2_s") missing.push_back(field);
     }
-    EXPECT_THAT(preset.missing(), testing::UnorderedElementsAreArray(missing)) << preset.name();
+    EXPECT_THAT(preset.missing(), ::testing::UnorderedElementsAreArray(missing)) << preset.name();
   }
 }
 

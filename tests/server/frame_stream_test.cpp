@@ -1,22 +1,309 @@
+#include <grpcpp/generic/generic_stub.h>
+
+#include <cstring>
+#include <thread>
+
 #include "tests/support/service/service.h"
 
 namespace weft::testing {
 namespace {
 
+using ::testing::ElementsAre;
+using ::testing::SizeIs;
+
+// Room for a few frames of the small scene.
+ServerOptions little_history() {
+  ServerOptions options = Service::in_process();
+  options.limits.history_bytes_per_session = 20'000;
+  return options;
+}
+
+void expect_numbers(const std::vector<v1::Frame>& frames, std::int64_t first, std::int64_t last) {
+  ASSERT_THAT(frames, SizeIs(last - first + 1));
+  for (const auto& frame : frames) EXPECT_EQ(frame.number(), first++);
+}
+
+std::vector<float> floats(const std::string& bytes) {
+  std::vector<float> values(bytes.size() / sizeof(float));
+  std::memcpy(values.data(), bytes.data(), bytes.size());
+  return values;
+}
+
+std::vector<double> doubles(const std::string& bytes) {
+  std::vector<double> values(bytes.size() / sizeof(double));
+  std::memcpy(values.data(), bytes.data(), bytes.size());
+  return values;
+}
+
 TEST(StreamFrames, SendsAHeaderAndThenEveryFrameInOrder) {
   Service service;
-  const v1::Session session = service.create();
-  service.step(session.name(), 5);
+  v1::Scene scene = small_scene();
+  *scene.add_sheets() = scene.sheets(0);
+  scene.mutable_sheets(1)->mutable_grid()->set_columns(6);
+  const v1::Session session = service.create(scene);
+  service.step(session, 5);
   Stream stream(service, frames_of(session, 0, 5));
   const v1::StreamHeader header = stream.header();
+  EXPECT_EQ(header.session(), session.name());
   EXPECT_EQ(header.uid(), session.uid());
-  EXPECT_EQ(header.sheets(0).rows(), 4);
-  EXPECT_EQ(header.sheets(0).columns(), 5);
+  EXPECT_EQ(header.numerics_id(), service.info().numerics_id());
+  EXPECT_EQ(header.frame_step_s(), 1.0 / 60);
+  EXPECT_EQ(header.format().encoding(), v1::FRAME_ENCODING_FLOAT64);
+  ASSERT_EQ(header.sheets_size(), 2);
+  EXPECT_EQ(header.sheets(1).name(), "sheet-2");
+  EXPECT_EQ(header.sheets(1).first_particle(), 20);
+  EXPECT_EQ(header.sheets(1).rows(), 4);
+  EXPECT_EQ(header.sheets(1).columns(), 6);
   const auto frames = stream.rest();
-  ASSERT_EQ(frames.size(), 6u);
-  for (int i = 0; i < 6; ++i) EXPECT_EQ(frames[static_cast<std::size_t>(i)].number(), i);
-  EXPECT_EQ(frames[3].positions_m().size(), 3 * 20 * sizeof(double));
-  EXPECT_TRUE(stream.finish().ok());
+  expect_numbers(frames, 0, 5);
+  EXPECT_THAT(frames[3].positions_m(), SizeIs(3 * 44 * sizeof(double)));
+  EXPECT_EQ(stream.finish().code, grpc::StatusCode::OK);
+}
+
+TEST(StreamFrames, SendsWhatTheFormatAsksForAndNoMore) {
+  Service service;
+  const v1::Session session = service.create();
+  service.step(session, 3);
+  v1::StreamFramesRequest request;
+  request.set_session(session.name());
+  Stream plain(service, request);
+  EXPECT_EQ(plain.header().format().encoding(), v1::FRAME_ENCODING_FLOAT32);
+  const v1::Frame single = plain.frame();
+  EXPECT_EQ(single.number(), 3) << "without start_frame: the newest";
+  EXPECT_TRUE(single.velocities_m_per_s().empty());
+  EXPECT_FALSE(single.has_stats());
+  request.mutable_format()->set_encoding(v1::FRAME_ENCODING_FLOAT64);
+  request.mutable_format()->set_velocities(true);
+  request.mutable_format()->set_stats(true);
+  const v1::Frame full = Stream(service, request).frame();
+  EXPECT_THAT(full.velocities_m_per_s(), SizeIs(3 * 20 * sizeof(double)));
+  EXPECT_GT(full.stats().kinetic_energy_j(), 0);
+  EXPECT_EQ(full.stats().substep_count(), session.plan().substeps_per_frame());
+  const auto exact = doubles(full.positions_m());
+  EXPECT_EQ(floats(single.positions_m()), std::vector<float>(exact.begin(), exact.end()));
+}
+
+TEST(StreamFrames, ResumedAfterABreakHasEveryFrameOnceAndBitEqual) {
+  Service service;
+  const v1::Session session = service.create();
+  Stream undisturbed(service, frames_of(session, 0, 300));
+  std::vector<v1::Frame> received;
+  service.run(session, 300);
+  while (received.size() < 301) {
+    const auto next = static_cast<std::int64_t>(received.size());
+    Stream stream(service, frames_of(session, next, 300));
+    for (int i = 0; i < 70 && received.size() < 301; ++i) received.push_back(stream.frame());
+  }
+  expect_numbers(received, 0, 300);
+  const auto all = undisturbed.rest();
+  ASSERT_THAT(all, SizeIs(301));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(received[i].SerializeAsString(), all[i].SerializeAsString());
+  }
+}
+
+TEST(StreamFrames, OfManyWatchersAreEqual) {
+  Service service;
+  const v1::Session session = service.create();
+  std::vector<std::jthread> watchers;
+  std::vector<std::vector<v1::Frame>> frames(8);
+  for (auto& mine : frames) {
+    watchers.emplace_back([&] { mine = Stream(service, frames_of(session, 0, 60)).rest(); });
+  }
+  service.run(session, 60);
+  watchers.clear();
+  expect_numbers(frames[0], 0, 60);
+  for (const auto& mine : frames) {
+    ASSERT_THAT(mine, SizeIs(61));
+    EXPECT_EQ(mine[60].SerializeAsString(), frames[0][60].SerializeAsString());
+  }
+}
+
+TEST(StreamFrames, WaitsForAFrameThatLiesAhead) {
+  Service service;
+  const v1::Session session = service.create();
+  Stream stream(service, frames_of(session, 7, 8));
+  EXPECT_EQ(stream.header().start_frame(), 7);
+  service.step(session, 10);
+  expect_numbers(stream.rest(), 7, 8);
+}
+
+TEST(StreamFrames, EndsASlowReaderThatDoesNotHoldTheSession) {
+  Service service(little_history());
+  const v1::Session session = service.create();
+  Stream stream(service, frames_of(session));
+  stream.header();
+  service.step(session, 2000);
+  const auto frames = stream.rest();
+  expect_numbers(frames, 0, static_cast<std::int64_t>(frames.size()) - 1);
+  const Error error = stream.finish();
+  EXPECT_EQ(error.code, grpc::StatusCode::OUT_OF_RANGE);
+  EXPECT_EQ(error.reason(), "FRAME_EXPIRED");
+  EXPECT_EQ(error.metadata("latest_frame"), "2000");
+  EXPECT_GT(std::stoll(error.metadata("oldest_frame")), 1900);
+}
+
+TEST(StreamFrames, LosesNothingForASlowReaderThatHoldsTheSession) {
+  Service service(little_history());
+  const v1::Session session = service.create();
+  auto request = frames_of(session, 0, 2000);
+  request.set_slow_reader(v1::SLOW_READER_HOLD_SESSION);
+  Stream stream(service, request);
+  stream.header();
+  std::jthread stepping([&] { service.step(session, 2000); });
+  expect_numbers(stream.rest(), 0, 2000);
+}
+
+TEST(StreamFrames, ReleasesTheSessionWhenAReaderThatHoldsItVanishes) {
+  Service service(little_history());
+  const v1::Session session = service.create();
+  auto request = frames_of(session);
+  request.set_slow_reader(v1::SLOW_READER_HOLD_SESSION);
+  auto stream = std::make_unique<Stream>(service, request);
+  stream->header();
+  std::jthread stepping([&] { EXPECT_EQ(service.step(session, 2000).frame(), 2000); });
+  while (stream->frame().number() < 50) {
+  }
+  stream.reset();
+}
+
+TEST(StreamFrames, RefusesFramesThatAreNoLongerKept) {
+  Service service(little_history());
+  const v1::Session session = service.create();
+  service.step(session, 100);
+  const Error error = Stream(service, frames_of(session)).finish();
+  EXPECT_EQ(error.code, grpc::StatusCode::OUT_OF_RANGE);
+  EXPECT_EQ(error.reason(), "FRAME_EXPIRED");
+  EXPECT_EQ(error.metadata("latest_frame"), "100");
+  const std::int64_t oldest = std::stoll(error.metadata("oldest_frame"));
+  EXPECT_EQ(Stream(service, frames_of(session, oldest)).frame().number(), oldest);
+}
+
+TEST(StreamFrames, EndsWithItsSession) {
+  Service service;
+  const v1::Session session = service.create();
+  Stream stream(service, frames_of(session));
+  stream.frame();
+  service.erase(session);
+  const Error error = stream.finish();
+  EXPECT_EQ(error.code, grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(error.reason(), "SESSION_NOT_FOUND");
+}
+
+TEST(StreamFrames, EndsAfterTheLastGoodFrameOfASolverThatDiverged) {
+  Service service;
+  const v1::Session session = service.create(diverging_scene());
+  Stream stream(service, frames_of(session));
+  service.run(session, 100'000);
+  const auto frames = stream.rest();
+  expect_numbers(frames, 0, service.get(session).frame());
+  const Error error = stream.finish();
+  EXPECT_EQ(error.code, grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_EQ(error.reason(), "SOLVER_FAILED");
+  EXPECT_EQ(error.metadata("latest_frame"), std::to_string(frames.back().number()));
+  EXPECT_THAT(Stream(service, frames_of(session, 0, 0)).rest(), SizeIs(1))
+      << "the good frames stay readable";
+}
+
+TEST(StreamFrames, ReportsProgressWhenTheStateChangesAndWhileNothingHappens) {
+  Service service;
+  const v1::Session session = service.create();
+  Stream stream(service, frames_of(session));
+  stream.header();
+  EXPECT_TRUE(stream.read()->has_frame());
+  const auto idle = stream.read();  // two seconds later
+  ASSERT_TRUE(idle && idle->has_progress());
+  EXPECT_EQ(idle->progress().state(), v1::SESSION_STATE_PAUSED);
+  service.run(session, 40);
+  std::optional<v1::StreamFramesResponse> message;
+  std::int64_t frame = 0;
+  while ((message = stream.read()) && !(message->has_progress() && frame == 40)) {
+    if (message->has_frame()) frame = message->frame().number();
+  }
+  ASSERT_TRUE(message);
+  EXPECT_EQ(message->progress().state(), v1::SESSION_STATE_PAUSED);
+  EXPECT_EQ(message->progress().latest_frame(), 40);
+}
+
+TEST(StreamFrames, RefusesRequestsThatMakeNoSense) {
+  Service service;
+  const v1::Session session = service.create();
+  const auto fields_of = [&](const v1::StreamFramesRequest& request) {
+    const Error error = Stream(service, request).finish();
+    EXPECT_EQ(error.code, grpc::StatusCode::INVALID_ARGUMENT);
+    EXPECT_EQ(error.reason(), "FIELD_INVALID");
+    return error.fields();
+  };
+  EXPECT_THAT(fields_of(frames_of(session, -1)), ElementsAre("start_frame"));
+  EXPECT_THAT(fields_of(frames_of(session, 5, 4)), ElementsAre("end_frame"));
+  auto request = frames_of(session);
+  request.mutable_format()->set_encoding(static_cast<v1::FrameEncoding>(9));
+  request.set_slow_reader(static_cast<v1::SlowReader>(9));
+  EXPECT_THAT(fields_of(request), ElementsAre("format.encoding", "slow_reader"));
+  request = frames_of(session);
+  request.set_session("x");
+  EXPECT_THAT(fields_of(request), ElementsAre("session"));
+}
+
+TEST(StreamFrames, RefusesTheUidOfAnotherSessionOfThatName) {
+  Service service;
+  const v1::Session old = service.create(small_scene(), "curtain");
+  service.erase(old);
+  const v1::Session now = service.create(small_scene(), "curtain");
+  const Error error = Stream(service, frames_of(old)).finish();
+  EXPECT_EQ(error.code, grpc::StatusCode::ABORTED);
+  EXPECT_EQ(error.reason(), "UID_CHANGED");
+  EXPECT_EQ(error.metadata("uid"), now.uid());
+}
+
+TEST(StreamFrames, RefusesAFormatWhoseFramesAreTooLarge) {
+  ServerOptions options = Service::in_process();
+  options.limits.max_frame_bytes = 700;
+  Service service(options);
+  const v1::Session session = service.create();
+  auto request = frames_of(session, 0, 0);
+  const Error error = Stream(service, request).finish();
+  EXPECT_EQ(error.code, grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(error.fields(), ElementsAre("format"));
+  request.mutable_format()->set_encoding(v1::FRAME_ENCODING_FLOAT32);
+  EXPECT_EQ(Stream(service, request).finish().code, grpc::StatusCode::OK);
+}
+
+TEST(StreamFrames, RefusesMoreStreamsThanItsLimit) {
+  ServerOptions options = Service::in_process();
+  options.limits.max_streams = 2;
+  Service service(options);
+  const v1::Session session = service.create();
+  Stream one(service, frames_of(session)), two(service, frames_of(session));
+  one.frame();
+  two.frame();
+  const Error error = Stream(service, frames_of(session)).finish();
+  EXPECT_EQ(error.code, grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(error.quota.violations(0).subject(), "streams");
+  EXPECT_TRUE(error.retry);
+}
+
+TEST(StreamFrames, RefusesBytesThatAreNoRequest) {
+  Service service;
+  grpc::GenericStub stub(service.channel);
+  grpc::CompletionQueue queue;
+  const auto next = [&] {
+    void* tag = nullptr;
+    bool ok = false;
+    EXPECT_TRUE(queue.Next(&tag, &ok));
+  };
+  grpc::ClientContext context;
+  const auto call = stub.PrepareCall(&context, "/weft.v1.FrameService/StreamFrames", &queue);
+  call->StartCall(nullptr);
+  next();
+  const grpc::Slice slice(std::string("\xff\xff\xff\xff"));
+  call->WriteLast(grpc::ByteBuffer(&slice, 1), {}, nullptr);
+  next();
+  grpc::Status status;
+  call->Finish(&status, nullptr);
+  next();
+  EXPECT_EQ(Error(status).code, grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(Error(status).reason(), "MESSAGE_MALFORMED");
 }
 
 }  // namespace

@@ -7,14 +7,15 @@
 namespace weft::testing {
 namespace {
 
-template <class Stub, class Request, class Response>
-grpc::Status call(Stub& stub, auto method, const Request& request, Response* response) {
-  grpc::ClientContext context;
-  return (stub.*method)(&context, request, response);
-}
-
 void expect_ok(const grpc::Status& status) {
   EXPECT_TRUE(status.ok()) << status.error_code() << ": " << status.error_message();
+}
+
+v1::CreateSessionRequest create_request(const v1::Scene& scene, const std::string& id) {
+  v1::CreateSessionRequest request;
+  *request.mutable_session()->mutable_scene() = scene;
+  request.set_session_id(id);
+  return request;
 }
 
 }  // namespace
@@ -81,56 +82,60 @@ ServerOptions Service::in_process() {
 
 v1::Session Service::create(const v1::Scene& scene, const std::string& id) {
   v1::Session session;
-  expect_ok(try_create(scene, id, &session));
+  expect_ok(call(&Sessions::CreateSession, create_request(scene, id), &session));
   return session;
 }
 
-grpc::Status Service::try_create(const v1::Scene& scene, const std::string& id,
-                                 v1::Session* created) {
-  v1::CreateSessionRequest request;
-  *request.mutable_session()->mutable_scene() = scene;
-  request.set_session_id(id);
-  v1::Session session;
-  return call(*sessions, &v1::SessionService::Stub::CreateSession, request,
-              created == nullptr ? &session : created);
+Error Service::create_error(const v1::Scene& scene, const std::string& id) {
+  return error(&Sessions::CreateSession, create_request(scene, id));
 }
 
-v1::Session Service::get(const std::string& name) {
+v1::Session Service::get(const v1::Session& session) {
   v1::GetSessionRequest request;
-  request.set_name(name);
-  v1::Session session;
-  expect_ok(call(*sessions, &v1::SessionService::Stub::GetSession, request, &session));
-  return session;
+  request.set_name(session.name());
+  v1::Session response;
+  expect_ok(call(&Sessions::GetSession, request, &response));
+  return response;
 }
 
-v1::StepSessionResponse Service::step(const std::string& name, std::int64_t count) {
+v1::StepSessionResponse Service::step(const v1::Session& session, std::int64_t count) {
   v1::StepSessionRequest request;
-  request.set_name(name);
+  request.set_name(session.name());
   request.set_frames(count);
   v1::StepSessionResponse response;
-  expect_ok(call(*sessions, &v1::SessionService::Stub::StepSession, request, &response));
+  expect_ok(call(&Sessions::StepSession, request, &response));
   return response;
 }
 
-grpc::Status Service::try_step(const v1::StepSessionRequest& request) {
-  v1::StepSessionResponse response;
-  return call(*sessions, &v1::SessionService::Stub::StepSession, request, &response);
-}
-
-v1::RunSessionResponse Service::run(const std::string& name, std::int64_t until_frame) {
+v1::RunSessionResponse Service::run(const v1::Session& session, std::int64_t until_frame) {
   v1::RunSessionRequest request;
-  request.set_name(name);
-  if (until_frame >= 0) request.set_until_frame(until_frame);
+  request.set_name(session.name());
+  request.set_until_frame(until_frame);
   v1::RunSessionResponse response;
-  expect_ok(call(*sessions, &v1::SessionService::Stub::RunSession, request, &response));
+  expect_ok(call(&Sessions::RunSession, request, &response));
   return response;
 }
 
-void Service::erase(const std::string& name) {
+v1::PauseSessionResponse Service::pause(const v1::Session& session) {
+  v1::PauseSessionRequest request;
+  request.set_name(session.name());
+  v1::PauseSessionResponse response;
+  expect_ok(call(&Sessions::PauseSession, request, &response));
+  return response;
+}
+
+void Service::erase(const v1::Session& session) {
   v1::DeleteSessionRequest request;
-  request.set_name(name);
+  request.set_name(session.name());
   v1::DeleteSessionResponse response;
-  expect_ok(call(*sessions, &v1::SessionService::Stub::DeleteSession, request, &response));
+  expect_ok(call(&Sessions::DeleteSession, request, &response));
+}
+
+v1::ServerInfo Service::info() {
+  grpc::ClientContext context;
+  v1::ServerInfo info;
+  expect_ok(servers->GetServerInfo(&context, {}, &info));
+  return info;
 }
 
 Stream::Stream(Service& service, const v1::StreamFramesRequest& request)
@@ -166,10 +171,10 @@ std::vector<v1::Frame> Stream::rest() {
   return all;
 }
 
-grpc::Status Stream::finish() {
+Error Stream::finish() {
   while (read()) {
   }
-  return reader_->Finish();
+  return Error(reader_->Finish());
 }
 
 v1::StreamFramesRequest frames_of(const v1::Session& session, std::int64_t start,

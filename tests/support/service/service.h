@@ -38,20 +38,38 @@ struct Error {
   std::vector<std::string> fields() const;
 };
 
-// A server within the test and stubs to call it. Methods that are not about errors expect none.
+// A server within the test and stubs to call it. Methods that return no status expect success.
 class Service {
  public:
+  using Sessions = v1::SessionService::Stub;
+
   explicit Service(ServerOptions options = in_process());
   static ServerOptions in_process();
 
+  template <class Request, class Response>
+  grpc::Status call(grpc::Status (Sessions::*method)(grpc::ClientContext*, const Request&,
+                                                     Response*),
+                    const Request& request, Response* response) {
+    grpc::ClientContext context;
+    return (sessions.get()->*method)(&context, request, response);
+  }
+
+  // The error, or the absence of one, that a call ends with.
+  template <class Request, class Response>
+  Error error(grpc::Status (Sessions::*method)(grpc::ClientContext*, const Request&, Response*),
+              const Request& request) {
+    Response response;
+    return Error(call(method, request, &response));
+  }
+
   v1::Session create(const v1::Scene& scene = small_scene(), const std::string& id = {});
-  grpc::Status try_create(const v1::Scene& scene, const std::string& id = {},
-                          v1::Session* created = nullptr);
-  v1::Session get(const std::string& name);
-  v1::StepSessionResponse step(const std::string& name, std::int64_t count = 1);
-  grpc::Status try_step(const v1::StepSessionRequest& request);
-  v1::RunSessionResponse run(const std::string& name, std::int64_t until_frame);
-  void erase(const std::string& name);
+  Error create_error(const v1::Scene& scene, const std::string& id = {});
+  v1::Session get(const v1::Session& session);
+  v1::StepSessionResponse step(const v1::Session& session, std::int64_t count = 1);
+  v1::RunSessionResponse run(const v1::Session& session, std::int64_t until_frame);
+  v1::PauseSessionResponse pause(const v1::Session& session);
+  void erase(const v1::Session& session);
+  v1::ServerInfo info();
 
   Server server;
   std::shared_ptr<grpc::Channel> channel = server.in_process_channel();
@@ -70,7 +88,7 @@ class Stream {
   v1::StreamHeader header();                       // expects it to come next
   v1::Frame frame();                               // skips everything else
   std::vector<v1::Frame> rest();                   // all frames until the end
-  grpc::Status finish();                           // reads to the end
+  Error finish();                                  // reads to the end
   void cancel() { context_.TryCancel(); }
 
  private:

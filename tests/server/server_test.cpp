@@ -1,0 +1,159 @@
+#include "server/server.h"
+
+#include <grpcpp/health_check_service_interface.h>
+
+#include <thread>
+
+#include "server/config.h"
+#include "tests/support/service/service.h"
+
+namespace weft::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+TEST(Server, TellsItsVersionAndLimits) {
+  ServerOptions options = Service::in_process();
+  options.limits.max_sessions = 17;
+  Service service(options);
+  service.create();
+  const v1::ServerInfo info = service.info();
+  EXPECT_FALSE(info.version().empty());
+  EXPECT_FALSE(info.numerics_id().empty());
+  EXPECT_EQ(info.worker_threads(), 2);
+  EXPECT_EQ(info.sessions(), 1);
+  EXPECT_EQ(info.limits().max_sessions(), 17);
+  EXPECT_EQ(info.limits().max_request_bytes(), 16 << 20);
+}
+
+TEST(Server, ServesManyClientsAtOnce) {
+  Service service;
+  std::vector<std::jthread> clients;
+  for (int i = 0; i < 20; ++i) {
+    clients.emplace_back([&, i] {
+      const v1::Session session = service.create(small_scene(), "client-" + std::to_string(i));
+      Stream stream(service, frames_of(session, 0, 50));
+      service.run(session, 50);
+      const auto frames = stream.rest();
+      ASSERT_THAT(frames, SizeIs(51));
+      for (int k = 0; k <= 50; ++k) EXPECT_EQ(frames[static_cast<std::size_t>(k)].number(), k);
+      EXPECT_EQ(stream.finish().code, grpc::StatusCode::OK);
+      service.erase(session);
+    });
+  }
+  clients.clear();
+  EXPECT_EQ(service.info().sessions(), 0);
+}
+
+TEST(Server, ListensOnAFreePortAndNoOtherServerSharesIt) {
+  ServerOptions options;
+  const Server server(options);
+  ASSERT_THAT(server.address(), ::testing::StartsWith("127.0.0.1:"));
+  options.port = std::stoi(server.address().substr(10));
+  EXPECT_GT(options.port, 0);
+  EXPECT_THROW(Server{options}, std::runtime_error);
+}
+
+TEST(Server, StopsWithAStepUnderWay) {
+  Service service;
+  const v1::Session session = service.create();
+  Stream stream(service, frames_of(session));
+  std::jthread stepping([&] {
+    v1::StepSessionRequest request;
+    request.set_name(session.name());
+    request.set_frames(100'000);
+    const Error error = service.error(&Service::Sessions::StepSession, request);
+    EXPECT_EQ(error.code, grpc::StatusCode::UNAVAILABLE);
+    EXPECT_EQ(error.reason(), "SERVER_DRAINING");
+  });
+  while (stream.frame().number() < 3) {
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  service.server.stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(60));
+}
+
+TEST(Server, StopsWithAReaderThatDoesNotRead) {
+  Service service;
+  const v1::Session session = service.create();
+  Stream stream(service, frames_of(session));
+  stream.header();
+  service.step(session, 500);
+  service.server.stop(std::chrono::milliseconds(100));
+}
+
+// What read_config says to flags.
+std::string refusal(std::vector<const char*> flags) {
+  flags.insert(flags.begin(), "weftd");
+  try {
+    read_config(static_cast<int>(flags.size()), flags.data());
+  } catch (const ConfigExit& exit) {
+    return exit.text;
+  }
+  return "";
+}
+
+Config config(std::vector<const char*> flags) {
+  flags.insert(flags.begin(), "weftd");
+  return read_config(static_cast<int>(flags.size()), flags.data());
+}
+
+// A file that is gone with the test.
+class TomlFile {
+ public:
+  explicit TomlFile(const std::string& text) {
+    const int file = mkstemp(path_);
+    EXPECT_EQ(write(file, text.data(), text.size()), static_cast<ssize_t>(text.size()));
+    close(file);
+  }
+  ~TomlFile() { unlink(path_); }
+  const char* path() const { return path_; }
+
+ private:
+  char path_[32] = "/tmp/weft-config-XXXXXX";
+};
+
+TEST(Config, TakesFlagsBeforeTheFileAndTheFileBeforeDefaults) {
+  const TomlFile file("port = 4000\nmax_sessions = 5\nlog_level = \"warn\"\n");
+  const Config read = config({"--config", file.path(), "--port", "4001"});
+  EXPECT_EQ(read.server.port, 4001);
+  EXPECT_EQ(read.server.limits.max_sessions, 5);
+  EXPECT_EQ(read.log_level, "warn");
+  EXPECT_EQ(read.server.limits.max_streams, Limits().max_streams);
+  EXPECT_EQ(read.server.host, "127.0.0.1");
+}
+
+TEST(Config, NamesFileLineKeyValueAndBoundOfWhatIsWrong) {
+  const TomlFile range("port = 1\n\nmax_sessions = 0\n");
+  EXPECT_THAT(
+      refusal({"--config", range.path()}),
+      HasSubstr(std::string(range.path()) + ":3: max_sessions is 0, not within 1 to 100000"));
+  const TomlFile unknown("port = 1\nprt = 2\n");
+  EXPECT_THAT(refusal({"--config", unknown.path()}), HasSubstr(":2: prt is not known"));
+  const TomlFile type("port = \"one\"\n");
+  EXPECT_THAT(refusal({"--config", type.path()}), HasSubstr(":1: port is not a whole number"));
+  const TomlFile syntax("\nport = = 1\n");
+  EXPECT_THAT(refusal({"--config", syntax.path()}), HasSubstr(std::string(syntax.path()) + ":2"));
+  EXPECT_THAT(refusal({"--config", "/nowhere.toml"}), HasSubstr("/nowhere.toml"));
+  EXPECT_THAT(refusal({"--workers", "0"}), HasSubstr("--workers is 0, not within 1 to 1024"));
+  EXPECT_THAT(refusal({"--log-level", "loud"}), HasSubstr("--log-level is \"loud\""));
+  EXPECT_THAT(refusal({"--prt", "1"}), HasSubstr("--prt"));
+}
+
+TEST(Config, RefusesToListenBeyondThisMachineUnlessToldTwice) {
+  EXPECT_THAT(refusal({"--host", "0.0.0.0"}), HasSubstr("--insecure"));
+  EXPECT_EQ(config({"--host", "0.0.0.0", "--insecure"}).server.host, "0.0.0.0");
+}
+
+TEST(Config, HelpsWithEveryFlag) {
+  const std::string help = refusal({"--help"});
+  for (const char* flag :
+       {"--host", "--port", "--config", "--insecure", "--workers", "--max-sessions",
+        "--max-particles", "--max-streams", "--history-bytes", "--log-level"}) {
+    EXPECT_THAT(help, HasSubstr(flag));
+  }
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -1,0 +1,104 @@
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <optional>
+
+#include "tests/support/service/service.h"
+
+namespace weft::testing {
+namespace {
+
+// weftd as a process of its own.
+class Weftd {
+ public:
+  explicit Weftd(const std::string& port = "0") {
+    int ends[2];
+    EXPECT_EQ(pipe2(ends, O_CLOEXEC), 0);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+    std::string program = std::string(WEFT_BIN_DIR) + "/weftd", flag = "--port=" + port;
+    char* arguments[] = {program.data(), flag.data(), nullptr};
+    EXPECT_EQ(posix_spawn(&process_, program.c_str(), &actions, nullptr, arguments, environ), 0);
+    posix_spawn_file_actions_destroy(&actions);
+    close(ends[1]);
+    for (char c = 0; read(ends[0], &c, 1) == 1 && c != '\n';) line_ += c;
+    close(ends[0]);
+  }
+  ~Weftd() {
+    if (process_ > 0) end(SIGKILL);
+  }
+
+  // Its first line.
+  const std::string& line() const { return line_; }
+  std::string address() const { return line_.substr(line_.rfind(' ') + 1); }
+  std::string port() const { return line_.substr(line_.rfind(':') + 1); }
+
+  // The exit code; nullopt where a signal ended it.
+  std::optional<int> end(int signal) {
+    kill(process_, signal);
+    return wait();
+  }
+  std::optional<int> wait() {
+    int status = 0;
+    waitpid(process_, &status, 0);
+    process_ = 0;
+    return WIFEXITED(status) ? std::optional(WEXITSTATUS(status)) : std::nullopt;
+  }
+
+ private:
+  pid_t process_ = 0;
+  std::string line_;
+};
+
+TEST(Weftd, ServesOnAFreePortThatItPrintsAndEndsCleanly) {
+  for (const int signal : {SIGTERM, SIGINT}) {
+    Weftd weftd;
+    ASSERT_THAT(weftd.line(), ::testing::StartsWith("weftd listening on 127.0.0.1:"));
+    const auto channel = grpc::CreateChannel(weftd.address(), grpc::InsecureChannelCredentials());
+    grpc::ClientContext context;
+    context.set_wait_for_ready(true);
+    v1::ServerInfo info;
+    EXPECT_TRUE(v1::ServerService::NewStub(channel)->GetServerInfo(&context, {}, &info).ok());
+    EXPECT_EQ(weftd.end(signal), 0);
+  }
+}
+
+TEST(Weftd, EndsStreamsWithAReasonWhenItIsTerminated) {
+  Weftd weftd;
+  const auto channel = grpc::CreateChannel(weftd.address(), grpc::InsecureChannelCredentials());
+  const auto sessions = v1::SessionService::NewStub(channel);
+  v1::CreateSessionRequest create;
+  *create.mutable_session()->mutable_scene() = small_scene();
+  grpc::ClientContext create_context, run_context, stream_context;
+  v1::Session session;
+  ASSERT_TRUE(sessions->CreateSession(&create_context, create, &session).ok());
+  const auto reader =
+      v1::FrameService::NewStub(channel)->StreamFrames(&stream_context, frames_of(session));
+  v1::RunSessionRequest run;
+  run.set_name(session.name());
+  v1::RunSessionResponse running;
+  ASSERT_TRUE(sessions->RunSession(&run_context, run, &running).ok());
+  v1::StreamFramesResponse message;
+  while (reader->Read(&message) && message.frame().number() < 5) {
+  }
+  EXPECT_EQ(weftd.end(SIGTERM), 0);
+  while (reader->Read(&message)) {
+  }
+  const Error error(reader->Finish());
+  EXPECT_EQ(error.code, grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(error.reason(), "SERVER_DRAINING");
+}
+
+TEST(Weftd, SaysSoWhenThePortIsTaken) {
+  const Weftd first;
+  Weftd second(first.port());
+  EXPECT_EQ(second.line(), "");
+  EXPECT_EQ(second.wait(), 1);
+}
+
+}  // namespace
+}  // namespace weft::testing

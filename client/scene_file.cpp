@@ -46,6 +46,13 @@ std::string line_of(const std::string& word, const std::string& text) {
       1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(place), '\n'));
 }
 
+// "sheets[0].grid" of "session.scene.sheets[0].grid"
+std::string place_in_file(std::string field) {
+  constexpr std::string_view kPrefix = "session.scene.";
+  if (field.starts_with(kPrefix)) field.erase(0, kPrefix.size());
+  return field;
+}
+
 }  // namespace
 
 v1::Scene read_scene(const std::string& path) {
@@ -72,12 +79,12 @@ v1::Session create_session(Connection& connection, const std::string& path,
                            v1::CreateSessionRequest request) try {
   *request.mutable_session()->mutable_scene() = read_scene(path);
   return connection.call(&v1::SessionService::Stub::CreateSession, request);
-} catch (Problem& problem) {
-  constexpr std::string_view kPrefix = "session.scene.";
-  for (auto& violation : problem.violations) {
-    if (violation.field.starts_with(kPrefix)) violation.field.erase(0, kPrefix.size());
+} catch (const Problem& problem) {
+  Problem placed(problem.exit, problem.code, problem.reason, place_in_file(problem.what()));
+  for (const auto& [field, description] : problem.violations) {
+    placed.violations.push_back({place_in_file(field), description});
   }
-  throw;
+  throw placed;
 }
 
 std::string scene_text(const v1::Scene& scene) {

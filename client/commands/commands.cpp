@@ -19,14 +19,11 @@ std::string sheets_text(const v1::Scene& scene) {
   return text;
 }
 
-std::string joined(const google::protobuf::RepeatedPtrField<std::string>& words) {
-  return fmt::format("{}", fmt::join(words, ", "));
-}
-
 }  // namespace
 
 void add_session_argument(CLI::App& command, std::string& session) {
   command.add_option("SESSION", session, "Name of the session (with --embedded: a scene file)")
+      ->type_name("")
       ->required();
 }
 
@@ -66,15 +63,15 @@ std::string plan_text(const v1::Plan& plan) {
                                       seconds_text(plan.substep_s())));
   if (plan.linear_bound_s() > 0) {
     facts.add("linear bound",
-              fmt::format("{}, for every shape (sheet {})", seconds_text(plan.linear_bound_s()),
+              fmt::format("{}, for every shape; limited by {}", seconds_text(plan.linear_bound_s()),
                           plan.limiting_sheet()));
   } else {
     facts.add("linear bound", "none for this integrator");
   }
   facts.add("close estimate", seconds_text(plan.estimated_bound_s()) + ", for the present shape")
       .add("damping ratio",
-           number_text(plan.damping_ratio()) + " of the stiffest mode, 1 is critical")
-      .add("passes", joined(plan.passes()));
+           number_text(plan.damping_ratio()) + " of the stiffest mode, 1 is critical");
+  for (const auto& pass : plan.passes()) facts.add("pass", pass);
   for (const auto& skipped : plan.skipped())
     facts.add("skipped", skipped.pass() + ": " + skipped.reason());
   for (const auto& warning : plan.warnings()) {

@@ -56,20 +56,24 @@ void add_export(CLI::App& app, Context& context) {
   ExportOrder& order = options->order;
   CLI::App* command =
       app.add_subcommand("export", "Write a recording as files that other tools open");
-  command->add_option("FILE", options->recording, "Recording")->required();
+  command->add_option("FILE", options->recording, "Recording")->type_name("")->required();
   command
       ->add_option("-f,--format", order.format,
                    "obj: a directory of meshes; pc2: point cache; csv: a row for every frame")
       ->required()
       ->transform(CLI::CheckedTransformer(formats).description("obj|pc2|csv"));
-  command->add_option("-o,--output", order.path, "File to write; for obj a directory")->required();
-  command->add_option("--sheet", order.sheet, "This sheet only; else all, in scene order");
+  command->add_option("-o,--output", order.path, "File to write; for obj a directory")
+      ->type_name("PATH")
+      ->required();
+  command->add_option("--sheet", order.sheet, "This sheet only; else all, in scene order")
+      ->type_name("NAME");
   auto* frames =
       command->add_option("--frames", options->frames, "Frames A to B; either may be left out")
           ->type_name("A:B");
   command
       ->add_option("--times", order.times_s,
                    "Frames at these simulated times instead, s: 0.05,0.1,...")
+      ->type_name("S")
       ->delimiter(',')
       ->excludes(frames);
   command->callback([&context, options] { run(context, *options); });

@@ -86,9 +86,10 @@ void add_record(CLI::App& app, Context& context) {
       app.add_subcommand("record", "Record the frames of a session to a file, losing none");
   add_session_argument(*command, order.session);
   command->add_option("-o,--output", order.path, "Recording to write; it must not exist")
+      ->type_name("FILE")
       ->required();
-  command->add_option("--from", order.from, "First frame; else the newest");
-  command->add_option("--to", order.to, "End after this frame");
+  command->add_option("--from", order.from, "First frame; else the newest")->type_name("N");
+  command->add_option("--to", order.to, "End after this frame")->type_name("N");
   command->add_flag("--until-rest", order.until_rest, "End at rest");
   command->add_flag("--run", order.run,
                     "Let the session run, as far as it is recorded (always with --embedded)");
@@ -98,6 +99,7 @@ void add_record(CLI::App& app, Context& context) {
   command
       ->add_option("--patience", options->patience_s,
                    "Seconds to try again after a connection broke")
+      ->type_name("S")
       ->capture_default_str();
   command->add_flag("--force", options->force, "Replace a file that exists");
   command->footer(

@@ -71,9 +71,12 @@ void add_run(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("run", "Let a session advance by itself");
   add_session_argument(*command, options->session);
-  command->add_option("--time-scale", options->time_scale,
-                      "Simulated seconds a second; else as fast as it goes");
-  command->add_option("--until-frame", options->until_frame, "Pause after this frame");
+  command
+      ->add_option("--time-scale", options->time_scale,
+                   "Simulated seconds a second; else as fast as it goes")
+      ->type_name("X");
+  command->add_option("--until-frame", options->until_frame, "Pause after this frame")
+      ->type_name("N");
   command->add_flag("--until-rest", options->until_rest, "Pause at rest");
   command->add_flag("--wait", options->wait, "Wait until it is paused again");
   command->callback([&context, options] { run(context, *options); });

@@ -64,8 +64,9 @@ void add_session(CLI::App& app, Context& context) {
   auto create = std::make_shared<CreateOptions>();
   CLI::App* command =
       session->add_subcommand("create", "Make a session, paused at frame 0, from a scene file");
-  command->add_option("FILE", create->path, "Scene file")->required();
-  command->add_option("--id", create->id, "Name of the session; else the server picks one");
+  command->add_option("FILE", create->path, "Scene file")->type_name("")->required();
+  command->add_option("--id", create->id, "Name of the session; else the server picks one")
+      ->type_name("NAME");
   command->callback([&context, create] { run_create(context, *create); });
 
   command = session->add_subcommand("list", "List all sessions");

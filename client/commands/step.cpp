@@ -30,9 +30,13 @@ void add_step(CLI::App& app, Context& context) {
   CLI::App* command =
       app.add_subcommand("step", "Compute frames of a paused session and wait for them");
   add_session_argument(*command, options->session);
-  command->add_option("--frames", options->frames, "How many")->capture_default_str();
-  command->add_option("--expected-frame", options->expected_frame,
-                      "Refuse unless this is the newest frame");
+  command->add_option("--frames", options->frames, "How many")
+      ->type_name("N")
+      ->capture_default_str();
+  command
+      ->add_option("--expected-frame", options->expected_frame,
+                   "Refuse unless this is the newest frame")
+      ->type_name("N");
   command->callback([&context, options] { run(context, *options); });
 }
 

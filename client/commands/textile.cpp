@@ -100,6 +100,9 @@ v1::Textile textile_of(Context& context, const std::string& session,
 }
 
 void run_set(Context& context, const SetOptions& options) {
+  if (options.preset.empty() && options.values.empty()) {
+    throw usage_problem("textile set: give --preset or --set");
+  }
   v1::UpdateTextileRequest request;
   request.set_name(context.session_name(options.session));
   request.set_sheet(options.sheet);
@@ -134,19 +137,21 @@ void add_textile(CLI::App& app, Context& context) {
 
   auto name = std::make_shared<std::string>();
   command = textile->add_subcommand("show", "Show a preset, every number with its source");
-  command->add_option("NAME", *name, "Preset, such as denim_11oz")->required();
+  command->add_option("NAME", *name, "Preset, such as denim_11oz")->type_name("")->required();
   command->callback([&context, name] { run_show(context, *name); });
 
   auto set = std::make_shared<SetOptions>();
   command =
       textile->add_subcommand("set", "Change the textile of a sheet, while the session runs too");
   add_session_argument(*command, set->session);
-  command->add_option("--sheet", set->sheet, "Sheet to change; may be left out where there is one");
-  CLI::Option_group* what = command->add_option_group("change");
-  what->add_option("--preset", set->preset, "The whole textile from a preset");
-  what->add_option("--set", set->values, "One value, such as bend_n_m2=2e-5; may be given again")
-      ->type_name("FIELD=VALUE");
-  what->require_option(1);
+  command->add_option("--sheet", set->sheet, "Sheet to change; may be left out where there is one")
+      ->type_name("NAME");
+  CLI::Option* preset =
+      command->add_option("--preset", set->preset, "The whole textile from a preset")
+          ->type_name("NAME");
+  command->add_option("--set", set->values, "One value, such as bend_n_m2=2e-5; may be given again")
+      ->type_name("FIELD=VALUE")
+      ->excludes(preset);
   command->callback([&context, set] { run_set(context, *set); });
 }
 

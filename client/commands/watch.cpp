@@ -150,7 +150,7 @@ void add_watch(CLI::App& app, Context& context) {
   CLI::App* command =
       app.add_subcommand("watch", "Show a session's frames as they come, until Ctrl-C");
   add_session_argument(*command, options->session);
-  command->add_option("--to", options->to, "End after this frame");
+  command->add_option("--to", options->to, "End after this frame")->type_name("N");
   command->add_flag("--until-rest", options->until_rest, "End at rest");
   command->add_flag("--run", options->run,
                     "Let the session run, as far as it is watched (always with --embedded)");

@@ -56,8 +56,11 @@ std::string Facts::text() const {
   std::size_t width = 0;
   for (const auto& row : rows_) width = std::max(width, row.first.size());
   std::string text;
+  std::string_view previous;
   for (const auto& [label, value] : rows_) {
-    text += without_trailing_spaces(fmt::format("{:{}}  {}", label, width, value)) + '\n';
+    const std::string_view shown = label == previous ? "" : label;
+    text += without_trailing_spaces(fmt::format("{:{}}  {}", shown, width, value)) + '\n';
+    previous = label;
   }
   return text;
 }

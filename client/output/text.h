@@ -19,7 +19,7 @@ std::string percent_text(double fraction);
 // Four significant digits.
 std::string number_text(double number);
 
-// Label and value, one pair a line, values aligned.
+// Label and value, one pair a line, values aligned; a label that repeats is shown once.
 class Facts {
  public:
   Facts& add(std::string label, std::string value);

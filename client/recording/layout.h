@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <string_view>
 
 namespace weft::client {
@@ -14,7 +15,7 @@ inline constexpr const char* kRecordingTables = R"(
     recorded_at TEXT NOT NULL,    -- UTC
     scene TEXT NOT NULL,          -- JSON of weft.v1.Scene
     header TEXT NOT NULL,         -- JSON of weft.v1.StreamHeader
-    checksum INTEGER NOT NULL);   -- CRC-32 of scene and header
+    checksum INTEGER NOT NULL);   -- CRC-32 of the columns before
   CREATE TABLE frames (
     number INTEGER PRIMARY KEY,
     time_s REAL NOT NULL,
@@ -22,7 +23,7 @@ inline constexpr const char* kRecordingTables = R"(
     checksum INTEGER NOT NULL);   -- CRC-32 of the session's uid, the number (8 bytes, little-endian) and the frame
 )";
 
-std::int64_t checksum_of_text(std::string_view scene, std::string_view header);
+std::int64_t checksum_of(std::initializer_list<std::string_view> parts);
 std::int64_t checksum_of_frame(std::string_view uid, std::int64_t number, std::string_view frame);
 
 }  // namespace weft::client

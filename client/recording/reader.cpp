@@ -23,15 +23,16 @@ RecordingReader::RecordingReader(const std::string& path)
   if (pragma(database_, "user_version") != kRecordingVersion)
     throw malformed(path, "made by another version of weft");
 
-  Statement row = database_.prepare("SELECT scene, header, checksum, recorded_at FROM recording");
+  Statement row =
+      database_.prepare("SELECT weft_version, recorded_at, scene, header, checksum FROM recording");
   if (!row.step()) throw damaged(path, "it does not say what it holds");
-  const std::string scene = row.bytes(0);
-  const std::string header = row.bytes(1);
-  const bool sound = row.integer(2) == checksum_of_text(scene, header) &&
+  recorded_at_ = row.bytes(1);
+  const std::string scene = row.bytes(2);
+  const std::string header = row.bytes(3);
+  const bool sound = row.integer(4) == checksum_of({row.bytes(0), recorded_at_, scene, header}) &&
                      google::protobuf::util::JsonStringToMessage(scene, &scene_).ok() &&
                      google::protobuf::util::JsonStringToMessage(header, &header_).ok();
-  if (!sound) throw damaged(path, "the scene's checksum is wrong");
-  recorded_at_ = row.bytes(3);
+  if (!sound) throw damaged(path, "the checksum of its description is wrong");
 }
 
 std::optional<std::int64_t> RecordingReader::find_from(std::int64_t number) {

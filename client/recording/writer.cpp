@@ -31,12 +31,13 @@ void describe(Database& database, const v1::Scene& scene, const v1::StreamHeader
                                kRecordingId, kRecordingVersion, kRecordingTables)
                        .c_str());
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+  const std::string recorded_at = fmt::format("{:%FT%TZ}", fmt::gmtime(now));
   database.prepare("INSERT INTO recording VALUES (?, ?, ?, ?, ?)")
       .bind_text(1, WEFT_VERSION)
-      .bind_text(2, fmt::format("{:%FT%TZ}", fmt::gmtime(now)))
+      .bind_text(2, recorded_at)
       .bind_text(3, scene_json)
       .bind_text(4, header_json)
-      .bind(5, checksum_of_text(scene_json, header_json))
+      .bind(5, checksum_of({WEFT_VERSION, recorded_at, scene_json, header_json}))
       .step();
   database.execute("COMMIT");
 }

@@ -1,0 +1,102 @@
+#include <fmt/format.h>
+
+#include "client/commands/commands.h"
+#include "client/exports/output_file.h"
+#include "client/output/text.h"
+#include "client/scene_file.h"
+#include "client/templates/templates.h"
+
+namespace weft::client {
+namespace {
+
+struct NewOptions {
+  std::string name;
+  std::string path;
+  TemplateOptions values;
+};
+
+void run_new(Context& context, const NewOptions& options) {
+  const v1::Scene scene = make_template(options.name, options.values);
+  if (options.path.empty()) {
+    context.terminal.out << scene_text(scene) << std::flush;
+    return;
+  }
+  OutputFile file(options.path);
+  file.write(scene_text(scene));
+  file.close();
+  context.answer({{"file", options.path}}, "wrote " + options.path + '\n');
+}
+
+void run_check(Context& context, const std::string& path) {
+  v1::CreateSessionRequest request;
+  request.set_validate_only(true);
+  const v1::Session session = create_session(context.connection(), path, request);
+
+  std::int64_t particles = 0;
+  for (const auto& sheet : session.scene().sheets()) {
+    particles += std::int64_t{sheet.grid().rows()} * sheet.grid().columns();
+  }
+  const std::string heading = fmt::format(
+      "{}: {}, {}, {}\n", path, count_of(session.scene().sheets_size(), "sheet"),
+      count_of(particles, "particle"), count_of(session.scene().colliders_size(), "collider"));
+  context.answer(to_json(session.plan()), heading + plan_text(session.plan()));
+}
+
+std::string template_list() {
+  std::string text = "Templates:\n";
+  std::size_t width = 0;
+  for (const auto& info : templates()) width = std::max(width, info.name.size());
+  for (const auto& info : templates())
+    text += fmt::format("  {:{}}  {}\n", info.name, width, info.description);
+  return text;
+}
+
+void add_new(CLI::App& scene, Context& context) {
+  const std::map<std::string, v1::Evaluator> evaluators{{"series", v1::EVALUATOR_SERIES},
+                                                        {"exact", v1::EVALUATOR_EXACT},
+                                                        {"linearized", v1::EVALUATOR_LINEARIZED},
+                                                        {"polynomial", v1::EVALUATOR_POLYNOMIAL}};
+  auto options = std::make_shared<NewOptions>();
+  TemplateOptions& values = options->values;
+  CLI::App* command = scene.add_subcommand("new", "Write a scene file from a template");
+  command->add_option("-t,--template", options->name, "Template to start from")
+      ->type_name("NAME")
+      ->required();
+  command->add_option("-o,--output", options->path, "Scene file to write; else it goes to stdout")
+      ->type_name("FILE");
+  command->add_option("--rows", values.rows, "Particles along z")->type_name("N");
+  command->add_option("--columns", values.columns, "Particles along x")->type_name("N");
+  command->add_option("--spacing", values.spacing_m, "Distance between neighbours, m")
+      ->type_name("M");
+  command->add_option("--textile", values.textile, "Textile preset (weft textile list)")
+      ->type_name("NAME");
+  command->add_option("--bend", values.bend, "k_b in the paper's unit, 1e-4 N m^2 (paper-*)")
+      ->type_name("K");
+  command->add_option("--evaluator", values.evaluator, "How bending is computed")
+      ->transform(
+          CLI::CheckedTransformer(evaluators).description("series|exact|linearized|polynomial"));
+  command->add_option("--segments", values.segments, "Line segments of the linearized law")
+      ->type_name("N");
+  command->add_flag("--fold-clamp", values.fold_clamp, "Linearize the clamped function (eq. 5)");
+  command->footer(template_list());
+  command->callback([&context, options] { run_new(context, *options); });
+}
+
+void add_check(CLI::App& scene, Context& context) {
+  auto path = std::make_shared<std::string>();
+  CLI::App* command = scene.add_subcommand(
+      "check", "Say what the solver would do for a scene, or all that is wrong with it");
+  command->add_option("FILE", *path, "Scene file")->type_name("")->required();
+  command->callback([&context, path] { run_check(context, *path); });
+}
+
+}  // namespace
+
+void add_scene(CLI::App& app, Context& context) {
+  CLI::App* scene = app.add_subcommand("scene", "Make and check scene files");
+  scene->require_subcommand(1);
+  add_new(*scene, context);
+  add_check(*scene, context);
+}
+
+}  // namespace weft::client

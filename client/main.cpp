@@ -1,0 +1,36 @@
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <iostream>
+#include <thread>
+
+#include "client/weft.h"
+
+namespace {
+
+// Ctrl-C asks for an end; a second one takes it.
+void wait_for_signals(sigset_t signals, std::stop_source stop) {
+  int signal = 0;
+  sigwait(&signals, &signal);
+  stop.request_stop();
+  sigwait(&signals, &signal);
+  std::_Exit(128 + signal);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before any thread starts
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error to report
+  std::stop_source stop;
+  std::thread(wait_for_signals, signals, stop).detach();
+
+  const weft::client::Terminal terminal{std::cout, std::cerr, isatty(STDOUT_FILENO) == 1,
+                                        isatty(STDERR_FILENO) == 1};
+  return weft::client::run_weft({argv + 1, argv + argc}, terminal, stop.get_token());
+}

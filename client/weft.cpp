@@ -1,0 +1,108 @@
+#include "client/weft.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "client/commands/commands.h"
+#include "client/context.h"
+
+namespace weft::client {
+namespace {
+
+constexpr const char* kDescription = "weft: simulates textiles on a server";
+
+constexpr const char* kFooter = R"(A first run:
+  weft scene new --template sphere -o scene.json
+  weft session create scene.json --id drape
+  weft record drape --run --until-rest -o drape.weft
+  weft export drape.weft --format obj -o drape
+
+With --embedded no server is needed: it lives within the command, and SESSION is a scene file.
+With --json every answer is one JSON document (watch: one a line), on stderr {"error": ...}.
+
+Exit codes:
+  0    done
+  1    refused by the server, or not to be had
+  2    wrong command line
+  3    no connection to the server
+  4    a file cannot be read or written, or is damaged
+  130  interrupted before its end)";
+
+std::string problem_text(const Problem& problem) {
+  const auto& violations = problem.violations;
+  if (violations.empty()) return std::string(problem.what()) + '\n';
+  if (violations.size() == 1) return violations[0].field + ": " + violations[0].description + '\n';
+  std::size_t width = 0;
+  for (const auto& violation : violations) width = std::max(width, violation.field.size());
+  std::string text = std::string(problem.what()) + '\n';
+  for (const auto& [field, description] : violations) {
+    text += fmt::format("  {:{}}  {}\n", field, width, description);
+  }
+  return text;
+}
+
+int report(const Problem& problem, const Context& context) {
+  const char* name = context.terminal.err_is_watched ? "\x1b[1;31mweft:\x1b[0m " : "weft: ";
+  context.terminal.err << (context.json ? to_json(problem).dump() + '\n'
+                                        : name + problem_text(problem))
+                       << std::flush;
+  return static_cast<int>(problem.exit);
+}
+
+void add_options(CLI::App& app, Context& context) {
+  app.add_option("--server", context.server, "Address of weftd")
+      ->type_name("ADDRESS")
+      ->envname("WEFT_SERVER")
+      ->capture_default_str();
+  app.add_flag("--embedded", context.embedded, "Use a server within this command instead");
+  app.add_flag("--json", context.json, "Answer in JSON");
+  app.set_version_flag("--version", WEFT_VERSION);
+}
+
+void add_commands(CLI::App& app, Context& context) {
+  add_scene(app, context);
+  add_session(app, context);
+  add_textile(app, context);
+  add_run(app, context);
+  add_pause(app, context);
+  add_step(app, context);
+  add_watch(app, context);
+  add_record(app, context);
+  add_info(app, context);
+  add_export(app, context);
+  add_demo(app, context);
+}
+
+}  // namespace
+
+int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
+             const std::stop_token& stop) {
+  Context context(terminal, stop);
+  context.json = std::find(arguments.begin(), arguments.end(), "--json") !=
+                 arguments.end();  // for usage errors too
+  CLI::App app(kDescription, "weft");
+  app.fallthrough();
+  app.get_formatter()->column_width(36);
+  app.require_subcommand(1);
+  app.footer("--server, --embedded and --json go with every command: weft --help");
+  add_options(app, context);
+  add_commands(app, context);
+  app.footer(kFooter);  // the commands keep the line above
+
+  try {
+    std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
+    app.parse(std::move(arguments));
+    return static_cast<int>(Exit::kDone);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error, terminal.out, terminal.err);
+    return report(usage_problem(std::string(error.what()) + " (weft --help, weft COMMAND --help)"),
+                  context);
+  } catch (const Problem& problem) {
+    return report(problem, context);
+  } catch (const std::exception& error) {
+    return report({Exit::kRefused, "INTERNAL", "INTERNAL", error.what()}, context);
+  }
+}
+
+}  // namespace weft::client

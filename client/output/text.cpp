@@ -58,7 +58,7 @@ std::string Facts::text() const {
   std::string text;
   std::string_view previous;
   for (const auto& [label, value] : rows_) {
-    const std::string_view shown = label == previous ? "" : label;
+    const auto shown = label == previous ? std::string_view() : std::string_view(label);
     text += without_trailing_spaces(fmt::format("{:{}}  {}", shown, width, value)) + '\n';
     previous = label;
   }

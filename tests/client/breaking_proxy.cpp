@@ -1,0 +1,110 @@
+#include "tests/client/breaking_proxy.h"
+
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <stdexcept>
+
+namespace weft::testing {
+namespace {
+
+constexpr int kPollMs = 20;  // how soon a close is noticed
+
+sockaddr_in loopback(int port) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  return address;
+}
+
+int port_of(const std::string& address) {
+  return std::stoi(address.substr(address.rfind(':') + 1));
+}
+
+int open_socket() {
+  const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (socket < 0) throw std::runtime_error("no socket");
+  return socket;
+}
+
+bool send_all(int socket, const char* bytes, std::size_t size) {
+  while (size > 0) {
+    const ssize_t sent = ::send(socket, bytes, size, MSG_NOSIGNAL);
+    if (sent <= 0) return false;
+    bytes += sent;
+    size -= static_cast<std::size_t>(sent);
+  }
+  return true;
+}
+
+// Without a farewell: the peer sees a reset.
+void reset(int socket) {
+  const linger hard{.l_onoff = 1, .l_linger = 0};
+  ::setsockopt(socket, SOL_SOCKET, SO_LINGER, &hard, sizeof(hard));
+  ::close(socket);
+}
+
+}  // namespace
+
+BreakingProxy::BreakingProxy(const std::string& target, int breaks, std::size_t bytes_each)
+    : target_(target), breaks_left_(breaks), bytes_each_(bytes_each), listener_(open_socket()) {
+  sockaddr_in address = loopback(0);
+  socklen_t size = sizeof(address);
+  if (::bind(listener_, reinterpret_cast<sockaddr*>(&address), size) != 0 ||
+      ::listen(listener_, 16) != 0 ||
+      ::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
+    throw std::runtime_error("no port for the proxy");
+  }
+  address_ = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  acceptor_ = std::thread([this] { accept_connections(); });
+}
+
+BreakingProxy::~BreakingProxy() { close(); }
+
+void BreakingProxy::close() {
+  closed_ = true;
+  if (acceptor_.joinable()) acceptor_.join();
+}
+
+void BreakingProxy::accept_connections() {
+  while (!closed_) {
+    pollfd waiting{.fd = listener_, .events = POLLIN, .revents = 0};
+    if (::poll(&waiting, 1, kPollMs) <= 0) continue;
+    const int client = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
+    if (client >= 0) relays_.emplace_back([this, client] { relay(client); });
+  }
+  ::close(listener_);
+  for (auto& relay : relays_) relay.join();
+}
+
+void BreakingProxy::relay(int client) {
+  const int server = open_socket();
+  const sockaddr_in address = loopback(port_of(target_));
+  bool open = ::connect(server, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+  const bool breaks = breaks_left_-- > 0;
+  std::size_t answered = 0;
+  std::array<char, 4096> buffer{};
+  std::array<pollfd, 2> ends{pollfd{client, POLLIN, 0}, pollfd{server, POLLIN, 0}};
+  while (open && !closed_) {
+    ::poll(ends.data(), ends.size(), kPollMs);
+    for (std::size_t i = 0; i < ends.size() && open; ++i) {
+      if (ends[i].revents == 0) continue;
+      const ssize_t received = ::recv(ends[i].fd, buffer.data(), buffer.size(), 0);
+      open = received > 0 &&
+             send_all(ends[1 - i].fd, buffer.data(), static_cast<std::size_t>(received));
+      if (i == 1 && open) answered += static_cast<std::size_t>(received);
+    }
+    if (breaks && answered > bytes_each_) {
+      ++broken_;
+      open = false;
+    }
+  }
+  reset(client);
+  reset(server);
+}
+
+}  // namespace weft::testing

@@ -1,0 +1,263 @@
+#include <gmock/gmock.h>
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <thread>
+
+#include "client/connection.h"
+#include "server/config.h"
+#include "tests/client/client_test.h"
+
+namespace weft::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+using CommandsTest = ClientTest;
+
+// Lines that are one JSON object each, by protobuf's own parser.
+std::vector<google::protobuf::Struct> json_lines(const std::string& text) {
+  std::vector<google::protobuf::Struct> objects;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const auto status = google::protobuf::util::JsonStringToMessage(line, &objects.emplace_back());
+    EXPECT_TRUE(status.ok()) << status.ToString() << " in " << line;
+  }
+  return objects;
+}
+
+TEST_F(CommandsTest, ASceneGoesFromTemplateThroughSessionAndRecordingToAnExport) {
+  const std::string scene = path("scene.json");
+  const std::string recording = path("drape.weft");
+  ask({"scene", "new", "--template", "sphere", "--rows", "7", "--columns", "9", "-o", scene});
+  EXPECT_GT(ask({"scene", "check", scene})["linear_bound_s"].get<double>(), 0);
+  EXPECT_EQ(ask({"session", "create", scene, "--id", "drape"})["name"], "sessions/drape");
+
+  const auto stepped = ask({"step", "drape", "--frames", "12"});
+  EXPECT_EQ(stepped["frame"], 12);
+  EXPECT_EQ(stepped["applied_frame"], 1);
+
+  const auto recorded = ask({"record", "drape", "--from", "0", "--to", "12", "-o", recording});
+  EXPECT_EQ(recorded["frames"], 13);
+  EXPECT_EQ(recorded["complete"], true);
+  const auto info = ask({"info", recording});
+  EXPECT_EQ(info["frames"], 13);
+  EXPECT_EQ(info["header"]["sheets"][0]["columns"], 9);
+  EXPECT_EQ(info["faults"], 0);
+
+  const auto exported = ask({"export", recording, "--format", "csv", "-o", path("drape.csv")});
+  EXPECT_EQ(exported["frames"], 13);
+  EXPECT_EQ(exported["particles"], 63);
+  EXPECT_EQ(ask({"session", "delete", "drape"})["deleted"], "sessions/drape");
+  EXPECT_TRUE(ask({"session", "list"})["sessions"].empty());
+}
+
+TEST_F(CommandsTest, ASceneFileIsRefusedWithEveryBadFieldAndItsPlaceInTheFile) {
+  v1::Scene scene = small_scene();
+  scene.mutable_sheets(0)->mutable_grid()->set_rows(1);
+  scene.mutable_sheets(0)->mutable_grid()->set_spacing_m(-0.5);
+  const std::string file = scene_file(scene);
+  for (const std::string command : {"check", "create"}) {
+    const Outcome refused = weft({command == "check" ? "scene" : "session", command, file});
+    EXPECT_EQ(refused.exit, 1);
+    EXPECT_THAT(refused.err, AllOf(HasSubstr("  sheets[0].grid.rows "), HasSubstr("-0.5"),
+                                   HasSubstr("  sheets[0].grid.spacing_m ")));
+  }
+  const auto error = nlohmann::json::parse(weft({"scene", "check", file, "--json"}).err)["error"];
+  EXPECT_EQ(error["code"], "INVALID_ARGUMENT");
+  EXPECT_EQ(error["reason"], "FIELD_INVALID");
+  EXPECT_THAT(error["violations"], SizeIs(2));
+  EXPECT_EQ(error["violations"][0]["field"], "sheets[0].grid.rows");
+}
+
+TEST_F(CommandsTest, AStepAboveTheBoundIsRefusedWithBoth) {
+  v1::Scene scene = small_scene();
+  scene.mutable_solver()->set_substep_s(0.01);
+  const Outcome refused = weft({"scene", "check", scene_file(scene), "--json"});
+  EXPECT_EQ(refused.exit, 1);
+  EXPECT_EQ(nlohmann::json::parse(refused.err)["error"]["reason"], "STEP_UNSTABLE");
+  EXPECT_THAT(refused.err,
+              AllOf(HasSubstr("0.00833"), HasSubstr("0.00116"), HasSubstr("solver.substep_s")));
+}
+
+TEST_F(CommandsTest, AnUnknownFieldIsNamedWithFileAndLine) {
+  write_file(path("scene.json"), "{\n \"sheets\": [{\n  \"grid\": {\"rowz\": 3}\n }]\n}\n");
+  const Outcome refused = weft({"scene", "check", path("scene.json")});
+  EXPECT_EQ(refused.exit, 4);
+  EXPECT_EQ(refused.err,
+            "weft: " + path("scene.json") + ", line 3: no such field: sheets[0].grid.rowz\n");
+}
+
+TEST_F(CommandsTest, JsonThatIsNoneIsReportedWithItsLine) {
+  write_file(path("scene.json"), "{\n \"sheets\": [\n  {,}\n ]\n}\n");
+  const Outcome refused = weft({"session", "create", path("scene.json")});
+  EXPECT_EQ(refused.exit, 4);
+  EXPECT_THAT(refused.err, HasSubstr("scene.json: line 3, column 4"));
+}
+
+TEST_F(CommandsTest, EveryKindOfFailureHasItsExitCode) {
+  EXPECT_EQ(weft({"session", "get", "nobody"}).exit, 1);
+  EXPECT_EQ(weft({}).exit, 2);
+  EXPECT_EQ(weft({"step"}).exit, 2);
+  EXPECT_EQ(weft({"fly", "away"}).exit, 2);
+  EXPECT_EQ(weft({"scene", "new", "--template", "moon"}).exit, 2);
+  EXPECT_EQ(weft({"scene", "check", path("missing.json")}).exit, 4);
+  EXPECT_EQ(weft({"info", path("missing.weft")}).exit, 4);
+  EXPECT_EQ(weft({"info", scene_file(small_scene())}).exit, 4);
+
+  service_.server.stop();
+  const Outcome lost = weft({"session", "list"});
+  EXPECT_EQ(lost.exit, 3);
+  EXPECT_THAT(lost.err, AllOf(HasSubstr(address_), HasSubstr("--server")));
+}
+
+TEST_F(CommandsTest, HelpIsAnAnswer) {
+  const Outcome help = weft({"--help"});
+  EXPECT_EQ(help.exit, 0);
+  EXPECT_THAT(help.out, AllOf(HasSubstr("Exit codes"), HasSubstr("record"), HasSubstr("export")));
+  EXPECT_THAT(weft({"record", "--help"}).out, HasSubstr("--until-rest"));
+}
+
+TEST_F(CommandsTest, EveryErrorIsJsonWhenAskedFor) {
+  for (const std::vector<std::string>& command :
+       std::vector<std::vector<std::string>>{{"session", "get", "nobody"},
+                                             {"step"},
+                                             {"scene", "check", path("missing.json")},
+                                             {"info", path("missing.weft")}}) {
+    std::vector<std::string> arguments = command;
+    arguments.emplace_back("--json");
+    const Outcome outcome = weft(arguments);
+    EXPECT_EQ(outcome.out, "");
+    const auto errors = json_lines(outcome.err);
+    ASSERT_THAT(errors, SizeIs(1));
+    const auto& error = errors[0].fields().at("error").struct_value().fields();
+    EXPECT_NE(error.at("code").string_value(), "");
+    EXPECT_NE(error.at("reason").string_value(), "");
+    EXPECT_NE(error.at("message").string_value(), "");
+  }
+}
+
+TEST_F(CommandsTest, EveryAnswerIsOneJsonDocumentWhenAskedFor) {
+  const std::string scene = scene_file(small_scene());
+  for (const std::vector<std::string>& command : std::vector<std::vector<std::string>>{
+           {"scene", "new", "--template", "flag", "-o", path("flag.json")},
+           {"scene", "check", scene},
+           {"session", "create", scene, "--id", "cloth"},
+           {"session", "get", "cloth"},
+           {"session", "list"},
+           {"textile", "list"},
+           {"textile", "show", "denim_11oz"},
+           {"textile", "set", "cloth", "--set", "bend_n_m2=2e-5"},
+           {"step", "cloth", "--frames", "3"},
+           {"run", "cloth", "--until-frame", "6", "--wait"},
+           {"record", "cloth", "--from", "0", "--to", "6", "-o", path("cloth.weft")},
+           {"info", path("cloth.weft")},
+           {"export", path("cloth.weft"), "--format", "obj", "-o", path("cloth")},
+           {"run", "cloth"},
+           {"pause", "cloth"},
+           {"session", "delete", "cloth"}}) {
+    std::vector<std::string> arguments = command;
+    arguments.emplace_back("--json");
+    const Outcome outcome = weft(arguments);
+    EXPECT_EQ(outcome.exit, 0) << command[0] << ": " << outcome.err;
+    EXPECT_THAT(json_lines(outcome.out), SizeIs(1)) << command[0];
+    EXPECT_EQ(outcome.err, "");
+  }
+}
+
+TEST_F(CommandsTest, ATextileValueIsChangedWhileTheSessionRuns) {
+  service_.create(small_scene(), "cloth");
+  ask({"run", "cloth"});
+  const auto set = ask({"textile", "set", "cloth", "--set", "bend_n_m2=3e-5", "--set",
+                        "damping_kg_per_s=0.001", "--set", "raw.shear_n_per_m=90"});
+  EXPECT_GT(set["applied_frame"], 0);
+  EXPECT_EQ(set["textile"]["raw"]["bend_n_m2"], 3e-5);
+  EXPECT_EQ(set["textile"]["raw"]["shear_n_per_m"], 90);
+  EXPECT_EQ(set["textile"]["raw"]["stretch_n_per_m"], 200);
+  EXPECT_EQ(set["textile"]["damping_kg_per_s"], 0.001);
+
+  const auto preset = ask({"textile", "set", "cloth", "--preset", "denim_11oz"});
+  EXPECT_GT(preset["textile"]["measured"]["areal_density_kg_per_m2"], 0);
+}
+
+TEST_F(CommandsTest, ABadTextileValueIsNamed) {
+  service_.create(small_scene(), "cloth");
+  const Outcome negative = weft({"textile", "set", "cloth", "--set", "bend_n_m2=-1"});
+  EXPECT_EQ(negative.exit, 1);
+  EXPECT_THAT(negative.err, AllOf(HasSubstr("raw.bend_n_m2"), HasSubstr("-1")));
+  EXPECT_EQ(weft({"textile", "set", "cloth", "--set", "weight=1"}).exit, 2);
+  EXPECT_EQ(weft({"textile", "set", "cloth", "--set", "bend_n_m2=soft"}).exit, 2);
+  EXPECT_EQ(weft({"textile", "set", "cloth"}).exit, 2);
+}
+
+TEST_F(CommandsTest, WatchWritesEveryFrameAsAJsonLine) {
+  service_.create(small_scene(), "cloth");
+  const Outcome outcome = weft({"watch", "cloth", "--run", "--to", "20", "--json"});
+  EXPECT_EQ(outcome.exit, 0) << outcome.err;
+  const auto lines = json_lines(outcome.out);
+  ASSERT_THAT(lines, SizeIs(21));
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    EXPECT_EQ(lines[i].fields().at("frame").number_value(), static_cast<double>(i));
+    EXPECT_EQ(lines[i].fields().count("kinetic_energy_j"), 1);
+  }
+}
+
+TEST_F(CommandsTest, WatchWritesPlainLinesWhereNobodyLooks) {
+  service_.create(small_scene(), "cloth");
+  const Outcome outcome = weft({"watch", "cloth", "--run", "--to", "20"});
+  EXPECT_EQ(outcome.exit, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("KINETIC J"), HasSubstr("\n      20 ")));
+  EXPECT_EQ(outcome.out.find('\x1b'), std::string::npos);
+}
+
+TEST_F(CommandsTest, RunWaitsForItsEnd) {
+  service_.create(small_scene(), "cloth");
+  EXPECT_EQ(ask({"run", "cloth", "--until-frame", "40", "--wait"})["frame"], 40);
+  EXPECT_EQ(ask({"session", "get", "cloth"})["state"], "SESSION_STATE_PAUSED");
+}
+
+TEST_F(CommandsTest, RunSaysWhyTheSolverGaveUp) {
+  service_.create(diverging_scene(), "cloth");
+  const Outcome outcome = weft({"run", "cloth", "--wait", "--json"});
+  EXPECT_EQ(outcome.exit, 1);
+  EXPECT_EQ(nlohmann::json::parse(outcome.err)["error"]["reason"], "SOLVER_FAILED");
+}
+
+TEST_F(CommandsTest, StepRefusesAnotherFrameThanTheOneExpected) {
+  service_.create(small_scene(), "cloth");
+  EXPECT_EQ(weft({"step", "cloth", "--expected-frame", "0"}).exit, 0);
+  EXPECT_EQ(weft({"step", "cloth", "--expected-frame", "0"}).exit, 1);
+}
+
+TEST_F(CommandsTest, EmbeddedNeedsNoServer) {
+  const std::string scene = scene_file(small_scene());
+  const std::string recording = path("cloth.weft");
+  EXPECT_EQ(run_weft({"scene", "check", scene, "--embedded"}).exit, 0);
+  const Outcome recorded =
+      run_weft({"record", scene, "--to", "30", "-o", recording, "--embedded", "--json"});
+  EXPECT_EQ(recorded.exit, 0) << recorded.err;
+  EXPECT_EQ(recorded.json()["frames"], 31);
+}
+
+TEST_F(CommandsTest, AStopEndsAWaitingCommand) {
+  const v1::Session session = service_.create(small_scene(), "cloth");
+  std::stop_source stop;
+  Outcome outcome;
+  std::thread waiting([&] { outcome = weft({"run", "cloth", "--wait"}, stop.get_token()); });
+  while (service_.get(session).frame() < 3) std::this_thread::yield();
+  stop.request_stop();
+  waiting.join();
+  EXPECT_EQ(outcome.exit, 130);
+}
+
+TEST(DefaultServer, IsWhereWeftdListens) {
+  const char* const arguments[] = {"weftd"};
+  const ServerOptions server = read_config(1, arguments).server;
+  EXPECT_EQ(*server.host + ':' + std::to_string(server.port), client::kDefaultServer);
+}
+
+}  // namespace
+}  // namespace weft::testing

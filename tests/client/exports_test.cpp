@@ -1,0 +1,175 @@
+#include <gmock/gmock.h>
+
+#include <cstring>
+#include <sstream>
+
+#include "client/recording/reader.h"
+#include "tests/client/client_test.h"
+
+namespace weft::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+// Two sheets, 4 x 5 and 3 x 6 particles.
+v1::Scene two_sheets() {
+  v1::Scene scene = small_scene();
+  scene.mutable_sheets(0)->set_name("left");
+  *scene.add_sheets() = scene.sheets(0);
+  v1::Sheet* right = scene.mutable_sheets(1);
+  right->set_name("right");
+  right->mutable_grid()->set_rows(3);
+  right->mutable_grid()->set_columns(6);
+  right->mutable_placement()->mutable_origin_m()->set_x(1);
+  return scene;
+}
+
+constexpr std::size_t kParticles = 20 + 18;
+constexpr std::int64_t kLast = 12;
+
+class ExportsTest : public ClientTest {
+ protected:
+  ExportsTest() {
+    service_.create(two_sheets(), "cloth");
+    ask({"record", "cloth", "--run", "--to", std::to_string(kLast), "--encoding", "float64", "-o",
+         file_});
+  }
+
+  // Coordinate `axis` of a particle, from the recording.
+  double recorded(std::int64_t frame, std::size_t axis, std::size_t particle) const {
+    double value = 0;
+    const std::string planes = client::RecordingReader(file_).read(frame).positions_m();
+    std::memcpy(&value, planes.data() + sizeof(value) * (axis * kParticles + particle),
+                sizeof(value));
+    return value;
+  }
+
+  const std::string file_ = path("cloth.weft");
+};
+
+std::vector<std::vector<double>> read_csv(const std::string& text, std::string& heading) {
+  std::istringstream lines(text);
+  std::getline(lines, heading);
+  std::vector<std::vector<double>> rows;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(std::stod(cell));
+  }
+  return rows;
+}
+
+TEST_F(ExportsTest, CsvHasARowForEveryFrame) {
+  ask({"export", file_, "--format", "csv", "-o", path("cloth.csv")});
+  std::string heading;
+  const auto rows = read_csv(read_file(path("cloth.csv")), heading);
+  EXPECT_THAT(heading,
+              AllOf(::testing::StartsWith("t,x0,y0,z0,x1,"), ::testing::EndsWith(",x37,y37,z37")));
+  ASSERT_EQ(rows.size(), kLast + 1);
+  for (std::size_t frame = 0; frame < rows.size(); ++frame) {
+    ASSERT_EQ(rows[frame].size(), 1 + 3 * kParticles);
+    EXPECT_NEAR(rows[frame][0], static_cast<double>(frame) / 60, 1e-11);
+    for (std::size_t i = 0; i < 3 * kParticles; ++i) {
+      const double wanted = recorded(static_cast<std::int64_t>(frame), i % 3, i / 3);
+      ASSERT_NEAR(rows[frame][1 + i], wanted, 0.51e-12);
+    }
+  }
+}
+
+TEST_F(ExportsTest, CsvOfOneSheetAndSomeFrames) {
+  ask({"export", file_, "-f", "csv", "--sheet", "right", "--frames", "3:5", "-o", path("a.csv")});
+  std::string heading;
+  const auto rows = read_csv(read_file(path("a.csv")), heading);
+  ASSERT_EQ(rows.size(), 3);
+  ASSERT_EQ(rows[0].size(), 1 + 3 * 18);
+  EXPECT_NEAR(rows[2][1], recorded(5, 0, 20), 0.51e-12);
+}
+
+TEST_F(ExportsTest, FramesAreFoundByTheirTime) {
+  ask({"export", file_, "-f", "csv", "--times", "0.1,0.05", "-o", path("a.csv")});
+  std::string heading;
+  const auto rows = read_csv(read_file(path("a.csv")), heading);
+  ASSERT_EQ(rows.size(), 2);
+  EXPECT_EQ(rows[0][0], 0.1);
+  EXPECT_NEAR(rows[0][2], recorded(6, 1, 0), 0.51e-12);
+  EXPECT_EQ(rows[1][0], 0.05);
+}
+
+TEST_F(ExportsTest, ATimeBetweenFramesIsRefusedWithItsNeighbours) {
+  const Outcome between = weft({"export", file_, "-f", "csv", "--times", "0.06", "-o", path("a")});
+  EXPECT_EQ(between.exit, 1);
+  EXPECT_THAT(between.err, AllOf(HasSubstr("frame 3 at 0.05 s"), HasSubstr("frame 4 at 0.0666")));
+  EXPECT_THAT(weft({"export", file_, "-f", "csv", "--times", "9", "-o", path("a")}).err,
+              HasSubstr("frame 12 at 0.2 s"));
+}
+
+TEST_F(ExportsTest, WhatIsNotThereIsAUsageError) {
+  EXPECT_EQ(weft({"export", file_, "-f", "csv", "--sheet", "up", "-o", path("a")}).exit, 2);
+  EXPECT_EQ(weft({"export", file_, "-f", "csv", "--frames", "90:", "-o", path("a")}).exit, 2);
+  EXPECT_EQ(weft({"export", file_, "-f", "csv", "--frames", "x", "-o", path("a")}).exit, 2);
+  EXPECT_EQ(weft({"export", file_, "-f", "gif", "-o", path("a")}).exit, 2);
+}
+
+template <class Number>
+Number number_at(const std::string& bytes, std::size_t place) {
+  Number number{};
+  std::memcpy(&number, bytes.data() + place, sizeof(number));
+  return number;
+}
+
+TEST_F(ExportsTest, Pc2IsAPointCacheOfAllFrames) {
+  ask({"export", file_, "--format", "pc2", "-o", path("cloth.pc2")});
+  const std::string bytes = read_file(path("cloth.pc2"));
+  ASSERT_EQ(bytes.size(), 32 + (kLast + 1) * kParticles * 12);
+  EXPECT_EQ(bytes.substr(0, 12), std::string("POINTCACHE2\0", 12));
+  EXPECT_EQ(number_at<std::int32_t>(bytes, 12), 1);
+  EXPECT_EQ(number_at<std::int32_t>(bytes, 16), kParticles);
+  EXPECT_EQ(number_at<float>(bytes, 20), 0);
+  EXPECT_EQ(number_at<float>(bytes, 24), 1);
+  EXPECT_EQ(number_at<std::int32_t>(bytes, 28), kLast + 1);
+  for (std::size_t i = 0; i < 3 * kParticles; ++i) {
+    const std::size_t place = 32 + (kLast * 3 * kParticles + i) * sizeof(float);
+    ASSERT_EQ(number_at<float>(bytes, place), static_cast<float>(recorded(kLast, i % 3, i / 3)));
+  }
+}
+
+TEST_F(ExportsTest, ObjIsAMeshOfQuadsForEveryFrame) {
+  ask({"export", file_, "--format", "obj", "--frames", "4:", "-o", path("meshes")});
+  EXPECT_FALSE(std::filesystem::exists(path("meshes/cloth_000003.obj")));
+  EXPECT_TRUE(std::filesystem::exists(path("meshes/cloth_000012.obj")));
+
+  std::istringstream lines(read_file(path("meshes/cloth_000004.obj")));
+  std::vector<std::string> names;
+  std::size_t vertices = 0;
+  std::size_t quads = 0;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string kind;
+    words >> kind;
+    if (kind == "o") names.emplace_back() = line.substr(2);
+    if (kind == "v") {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        double value = 0;
+        words >> value;
+        ASSERT_NEAR(value, recorded(4, axis, vertices), 1e-8);
+      }
+      ++vertices;
+    }
+    if (kind == "f") {
+      std::vector<std::size_t> corners(4);
+      for (auto& corner : corners) words >> corner;
+      const std::size_t columns = names.size() == 1 ? 5 : 6;
+      EXPECT_EQ(corners, (std::vector{corners[0], corners[0] + columns, corners[0] + columns + 1,
+                                      corners[0] + 1}));
+      EXPECT_LE(corners[2], vertices);
+      ++quads;
+    }
+  }
+  EXPECT_THAT(names, ::testing::ElementsAre("left", "right"));
+  EXPECT_EQ(vertices, kParticles);
+  EXPECT_EQ(quads, 3 * 4 + 2 * 5);
+}
+
+}  // namespace
+}  // namespace weft::testing

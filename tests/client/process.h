@@ -1,0 +1,28 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <string>
+#include <vector>
+
+namespace weft::testing {
+
+// One of the programs that were built, running.
+class Process {
+ public:
+  // What it writes goes to the file `output`. A limit of 0 bytes for files it writes: none.
+  Process(const std::string& program, const std::vector<std::string>& arguments,
+          const std::string& output, std::size_t file_size_limit = 0);
+  ~Process();  // kills it
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  void signal(int number) const;
+  // Its exit code, or 128 + the signal that ended it.
+  int wait();
+
+ private:
+  pid_t pid_ = -1;
+};
+
+}  // namespace weft::testing

@@ -1,0 +1,269 @@
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <filesystem>
+#include <thread>
+
+#include "client/problem.h"
+#include "client/recording/reader.h"
+#include "tests/client/breaking_proxy.h"
+#include "tests/client/client_test.h"
+#include "tests/client/process.h"
+
+namespace weft::testing {
+namespace {
+
+using client::RecordingReader;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class RecordingTest : public ClientTest {
+ protected:
+  // Frames of the file, which must follow each other from the first on.
+  std::vector<v1::Frame> recorded(const std::string& file) const {
+    RecordingReader reader(file);
+    std::vector<v1::Frame> frames;
+    std::int64_t expected = reader.header().start_frame();
+    while (const auto number = reader.find_from(expected)) {
+      EXPECT_EQ(*number, expected);
+      frames.push_back(reader.read(*number));
+      expected = *number + 1;
+    }
+    return frames;
+  }
+
+  // Waits until a recorder has put the frame into the file.
+  void await_frame(const std::string& file, std::int64_t number) const {
+    while (!has_frame(file, number)) std::this_thread::yield();
+  }
+
+  void expect_equal(const std::vector<v1::Frame>& found, const std::vector<v1::Frame>& wanted) {
+    ASSERT_EQ(found.size(), wanted.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      ASSERT_EQ(found[i].SerializeAsString(), wanted[i].SerializeAsString()) << "frame " << i;
+    }
+  }
+
+  const std::string file_ = path("cloth.weft");
+  const v1::Session session_ = service_.create(small_scene(), "cloth");
+
+ private:
+  static bool has_frame(const std::string& file, std::int64_t number) {
+    if (!std::filesystem::exists(file)) return false;
+    try {
+      return RecordingReader(file).find_from(number).has_value();
+    } catch (const client::Problem&) {
+      return false;  // not described yet
+    }
+  }
+};
+
+TEST_F(RecordingTest, HoldsEveryFrameBitEqualToTheStream) {
+  ask({"record", "cloth", "--run", "--to", "200", "--encoding", "float64", "-o", file_});
+  expect_equal(recorded(file_), stream("sessions/cloth", 0, 200, v1::FRAME_ENCODING_FLOAT64));
+}
+
+TEST_F(RecordingTest, HoldsVelocitiesWhereAsked) {
+  ask({"record", "cloth", "--run", "--to", "3", "--velocities", "-o", file_});
+  const auto frames = recorded(file_);
+  ASSERT_EQ(frames.size(), 4);
+  EXPECT_EQ(frames.back().velocities_m_per_s().size(), 20 * 3 * sizeof(float));
+}
+
+TEST_F(RecordingTest, EndsAtRest) {
+  const auto result = ask({"record", "cloth", "--run", "--until-rest", "-o", file_});
+  EXPECT_EQ(result["at_rest"], true);
+  EXPECT_EQ(result["complete"], true);
+  EXPECT_TRUE(recorded(file_).back().stats().at_rest());
+}
+
+TEST_F(RecordingTest, EndsWithTheRun) {
+  std::thread recording([&] { ask({"record", "cloth", "-o", file_}); });
+  await_frame(file_, 0);
+  service_.run(session_, 150);
+  recording.join();
+  EXPECT_EQ(recorded(file_).size(), 151);
+}
+
+TEST_F(RecordingTest, EndsCleanlyWhenItIsStopped) {
+  std::stop_source stop;
+  Outcome outcome;
+  std::thread recording([&] {
+    outcome = weft({"record", "cloth", "--run", "-o", file_, "--json"}, stop.get_token());
+  });
+  await_frame(file_, 1);
+  stop.request_stop();
+  recording.join();
+  EXPECT_EQ(outcome.exit, 0) << outcome.err;
+  const auto frames = recorded(file_);
+  EXPECT_EQ(outcome.json()["frames"], frames.size());
+  EXPECT_EQ(outcome.json()["complete"], false);
+}
+
+TEST_F(RecordingTest, SaysThatItWasStoppedBeforeItsEnd) {
+  std::stop_source stop;
+  Outcome outcome;
+  std::thread recording([&] {
+    outcome = weft({"record", "cloth", "--to", "9", "-o", file_}, stop.get_token());
+  });
+  await_frame(file_, 0);
+  stop.request_stop();
+  recording.join();
+  EXPECT_EQ(outcome.exit, 130);
+}
+
+TEST_F(RecordingTest, OfASolverThatGaveUpHasEveryGoodFrame) {
+  const v1::Session session = service_.create(diverging_scene(), "wild");
+  const Outcome outcome = weft({"record", "wild", "--run", "-o", file_, "--json"});
+  EXPECT_EQ(outcome.exit, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("SOLVER_FAILED"));
+  const std::int64_t last = service_.get(session).frame();
+  expect_equal(recorded(file_), stream("sessions/wild", 0, last));
+}
+
+TEST_F(RecordingTest, ResumesBrokenConnectionsWithEveryFrameOnce) {
+  constexpr std::int64_t kLast = 400;
+  const BreakingProxy proxy(address_, 4, 30'000);
+  Outcome outcome;
+  std::thread recording([&] {
+    outcome = run_weft({"record", "cloth", "--to", std::to_string(kLast), "-o", file_, "--json",
+                        "--server", proxy.address()});
+  });
+  await_frame(file_, 0);
+  service_.run(session_, kLast);
+  recording.join();
+  ASSERT_EQ(outcome.exit, 0) << outcome.err;
+  EXPECT_EQ(proxy.broken(), 4);
+  EXPECT_GE(outcome.json()["reconnections"], 4);
+  expect_equal(recorded(file_), stream("sessions/cloth", 0, kLast));
+}
+
+TEST_F(RecordingTest, GivesUpOnAServerThatIsGoneAndKeepsWhatItHas) {
+  BreakingProxy proxy(address_, 0, 0);
+  Outcome outcome;
+  std::thread recording([&] {
+    outcome = run_weft({"record", "cloth", "--to", "99", "--patience", "0", "-o", file_, "--server",
+                        proxy.address()});
+  });
+  await_frame(file_, 0);
+  service_.step(session_, 20);
+  await_frame(file_, 20);
+  proxy.close();
+  recording.join();
+  EXPECT_EQ(outcome.exit, 3);
+  EXPECT_EQ(recorded(file_).size(), 21);
+}
+
+TEST_F(RecordingTest, EndsWhenTheServerLeavesInOrder) {
+  Outcome outcome;
+  std::thread recording([&] { outcome = weft({"record", "cloth", "-o", file_, "--json"}); });
+  await_frame(file_, 0);
+  service_.server.stop();
+  recording.join();
+  EXPECT_EQ(outcome.exit, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("SERVER_DRAINING"));
+  EXPECT_EQ(recorded(file_).size(), 1);
+}
+
+TEST_F(RecordingTest, IsReadableAfterItsRecorderWasKilled) {
+  std::int64_t killed_after = 100;
+  for (int round = 0; round < 3; ++round, killed_after += 700) {
+    const std::string file = path("killed-" + std::to_string(round) + ".weft");
+    Process recorder(
+        "weft",
+        {"record", "cloth", "--from", "0", "--to", "900000", "-o", file, "--server", address_},
+        path("recorder.txt"));
+    await_frame(file, 0);
+    service_.run(session_, killed_after + 100'000);
+    await_frame(file, killed_after);
+    recorder.signal(SIGKILL);
+    EXPECT_EQ(recorder.wait(), 128 + SIGKILL);
+    service_.pause(session_);
+
+    const auto frames = recorded(file);
+    ASSERT_GT(frames.size(), static_cast<std::size_t>(killed_after));
+    EXPECT_EQ(ask({"info", file})["faults"], 0);
+    expect_equal(frames, stream("sessions/cloth", 0, static_cast<std::int64_t>(frames.size()) - 1));
+  }
+}
+
+TEST_F(RecordingTest, IsEndedCleanlyByCtrlC) {
+  Process recorder("weft", {"record", "cloth", "-o", file_, "--server", address_},
+                   path("recorder.txt"));
+  await_frame(file_, 0);
+  service_.step(session_, 10);
+  await_frame(file_, 10);
+  recorder.signal(SIGINT);
+  EXPECT_EQ(recorder.wait(), 0);
+  EXPECT_EQ(recorded(file_).size(), 11);
+  EXPECT_FALSE(std::filesystem::exists(file_ + "-journal"));
+}
+
+TEST_F(RecordingTest, StaysReadableWhenTheDiskIsFull) {
+  service_.step(session_, 2000);
+  Process recorder("weft",
+                   {"record", "cloth", "--from", "0", "--to", "2000", "-o", file_, "--server",
+                    address_, "--json"},
+                   path("recorder.txt"), 200'000);
+  EXPECT_EQ(recorder.wait(), 4);
+  EXPECT_THAT(read_file(path("recorder.txt")),
+              AllOf(HasSubstr("FILE_UNWRITABLE"), HasSubstr(file_)));
+  EXPECT_EQ(weft({"info", file_}).exit, 0);
+}
+
+TEST_F(RecordingTest, NeverReplacesAFileUnasked) {
+  write_file(file_, "precious");
+  const Outcome refused = weft({"record", "cloth", "--to", "0", "-o", file_});
+  EXPECT_EQ(refused.exit, 4);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr(file_), HasSubstr("exists")));
+  EXPECT_EQ(read_file(file_), "precious");
+  EXPECT_EQ(weft({"record", "cloth", "--to", "0", "-o", file_, "--force"}).exit, 0);
+  EXPECT_EQ(recorded(file_).size(), 1);
+}
+
+TEST_F(RecordingTest, NamesAPathThatCannotBeWritten) {
+  const Outcome refused = weft({"record", "cloth", "--to", "0", "-o", path("no/such/dir.weft")});
+  EXPECT_EQ(refused.exit, 4);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("no/such/dir.weft"), HasSubstr("No such file")));
+}
+
+// Whatever byte is changed, info finds it, unless nothing of the recording is in it.
+TEST_F(RecordingTest, IsCheckedForDamageByInfo) {
+  ask({"record", "cloth", "--run", "--to", "60", "-o", file_});
+  const std::string good = read_file(file_);
+  const std::string facts = weft({"info", file_, "--json"}).out;
+  const std::vector<v1::Frame> frames = recorded(file_);
+  int found = 0;
+  for (std::size_t place = 7; place < good.size(); place += 101) {
+    std::string bad = good;
+    bad[place] = static_cast<char>(bad[place] ^ 0x10);
+    write_file(file_, bad);
+    const Outcome outcome = weft({"info", file_, "--json"});
+    if (outcome.exit == 0) {
+      EXPECT_EQ(outcome.out, facts) << "byte " << place;
+      expect_equal(recorded(file_), frames);
+    } else {
+      EXPECT_EQ(outcome.exit, 4) << "byte " << place << ": " << outcome.err;
+      ++found;
+    }
+  }
+  EXPECT_GT(found, 150);
+}
+
+TEST_F(RecordingTest, NamesADamagedFrame) {
+  ask({"record", "cloth", "--run", "--to", "60", "-o", file_});
+  const std::string positions = RecordingReader(file_).read(31).positions_m();
+  std::string bytes = read_file(file_);
+  const std::size_t place = bytes.find(positions.substr(0, 64));
+  ASSERT_NE(place, std::string::npos);
+  bytes[place + 5] = static_cast<char>(bytes[place + 5] + 1);
+  write_file(file_, bytes);
+
+  const Outcome info = weft({"info", file_});
+  EXPECT_EQ(info.exit, 4);
+  EXPECT_THAT(info.err, HasSubstr("frame 31"));
+  EXPECT_EQ(weft({"export", file_, "-f", "csv", "-o", path("cloth.csv")}).exit, 4);
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -62,7 +62,7 @@ void Registry::close(Refusal::Why why) {
   {
     std::lock_guard lock(mutex_);
     closed_ = true;
-    sessions.swap(sessions_);
+    sessions = sessions_;
   }
   for (const auto& [id, session] : sessions) session->close(why);
 }

@@ -32,7 +32,7 @@ class Registry {
   // Takes a session out and ends it, where there is one.
   void erase(const std::string& id);
 
-  // Ends every session, and adds none any more.
+  // Ends every session, and adds none any more. They can still be found.
   void close(Refusal::Why why);
 
  private:

@@ -1,5 +1,6 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/message.h>
+#include <google/protobuf/util/message_differencer.h>
 
 #include <climits>
 #include <cmath>
@@ -69,10 +70,10 @@ v1::Scene full_scene() {
   v1::MeasuredTextile* textile = measured->mutable_textile()->mutable_measured();
   textile->set_areal_density_kg_per_m2(0.2);
   textile->set_tensile_warp_n_per_m(100);
-  textile->set_tensile_weft_n_per_m(100);
+  textile->set_tensile_weft_n_per_m(110);
   textile->set_shear_n_per_m(10);
   textile->set_bend_rigidity_warp_n_m(1e-5);
-  textile->set_bend_rigidity_weft_n_m(1e-5);
+  textile->set_bend_rigidity_weft_n_m(2e-5);
   textile->set_air_drag_kg_per_m2_s(0.1);
   measured->mutable_bending()->mutable_isometric();
   v1::Sheet* preset = scene.add_sheets();
@@ -256,6 +257,19 @@ void expect_everything_occurs(const v1::Scene& scene) {
     }
   };
   expect(*v1::Scene::descriptor());
+}
+
+TEST(GoodScenes, AreShownAsTheyWereGiven) {
+  Service service;
+  v1::Scene given = full_scene();
+  given.mutable_sheets()->RemoveLast();  // a preset is shown by its values
+  const v1::Scene shown = service.create(given).scene();
+  google::protobuf::util::MessageDifferencer differencer;
+  differencer.set_scope(google::protobuf::util::MessageDifferencer::PARTIAL);
+  std::string differences;
+  differencer.ReportDifferencesToString(&differences);
+  EXPECT_TRUE(differencer.Compare(given, shown)) << differences;
+  EXPECT_EQ(service.create(shown).scene().SerializeAsString(), shown.SerializeAsString());
 }
 
 TEST(BadScenes, OfEveryFieldAreRefusedByNameAndHarmNothing) {

@@ -1,5 +1,3 @@
-#include <grpcpp/generic/generic_stub.h>
-
 #include <cstring>
 #include <thread>
 
@@ -285,25 +283,10 @@ TEST(StreamFrames, RefusesMoreStreamsThanItsLimit) {
 
 TEST(StreamFrames, RefusesBytesThatAreNoRequest) {
   Service service;
-  grpc::GenericStub stub(service.channel);
-  grpc::CompletionQueue queue;
-  const auto next = [&] {
-    void* tag = nullptr;
-    bool ok = false;
-    EXPECT_TRUE(queue.Next(&tag, &ok));
-  };
-  grpc::ClientContext context;
-  const auto call = stub.PrepareCall(&context, "/weft.v1.FrameService/StreamFrames", &queue);
-  call->StartCall(nullptr);
-  next();
-  const grpc::Slice slice(std::string("\xff\xff\xff\xff"));
-  call->WriteLast(grpc::ByteBuffer(&slice, 1), {}, nullptr);
-  next();
-  grpc::Status status;
-  call->Finish(&status, nullptr);
-  next();
-  EXPECT_EQ(Error(status).code, grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(Error(status).reason(), "MESSAGE_MALFORMED");
+  const Error error =
+      raw_call(service, "/weft.v1.FrameService/StreamFrames", "\xff\xff\xff\xff").second;
+  EXPECT_EQ(error.code, grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(error.reason(), "MESSAGE_MALFORMED");
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include "server/server.h"
 
-#include <grpcpp/health_check_service_interface.h>
-
 #include <thread>
 
 #include "server/config.h"
@@ -83,6 +81,27 @@ TEST(Server, StopsWithAReaderThatDoesNotRead) {
   service.server.stop(std::chrono::milliseconds(100));
 }
 
+TEST(Server, IsHealthyAsAWholeAndByService) {
+  Service service;
+  const std::string serving = "\x08\x01";  // HealthCheckResponse{status: SERVING}
+  for (const std::string name : {"", "weft.v1.SessionService", "weft.v1.FrameService",
+                                 "weft.v1.ServerService", "weft.v1.TextileService"}) {
+    const std::string request = "\x0a" + std::string(1, static_cast<char>(name.size())) + name;
+    EXPECT_EQ(raw_call(service, "/grpc.health.v1.Health/Check", request).first, serving) << name;
+  }
+}
+
+TEST(Server, DescribesItselfByReflection) {
+  Service service;
+  const std::string list_services = "\x3a\x01*";
+  const std::string services =
+      raw_call(service, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+               list_services)
+          .first;
+  EXPECT_THAT(services, HasSubstr("weft.v1.SessionService"));
+  EXPECT_THAT(services, HasSubstr("weft.v1.FrameService"));
+}
+
 // What read_config says to flags.
 std::string refusal(std::vector<const char*> flags) {
   flags.insert(flags.begin(), "weftd");
@@ -143,6 +162,7 @@ TEST(Config, NamesFileLineKeyValueAndBoundOfWhatIsWrong) {
 
 TEST(Config, RefusesToListenBeyondThisMachineUnlessToldTwice) {
   EXPECT_THAT(refusal({"--host", "0.0.0.0"}), HasSubstr("--insecure"));
+  EXPECT_THAT(refusal({"--host", "127.example.com"}), HasSubstr("--insecure"));
   EXPECT_EQ(config({"--host", "0.0.0.0", "--insecure"}).server.host, "0.0.0.0");
 }
 

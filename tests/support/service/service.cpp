@@ -1,5 +1,7 @@
 #include "tests/support/service/service.h"
 
+#include <grpcpp/generic/generic_stub.h>
+
 #include <utility>
 
 #include "google/rpc/status.pb.h"
@@ -175,6 +177,25 @@ Error Stream::finish() {
   while (read()) {
   }
   return Error(reader_->Finish());
+}
+
+std::pair<std::string, Error> raw_call(Service& service, const std::string& method,
+                                       const std::string& request) {
+  grpc::GenericStub stub(service.channel);
+  grpc::CompletionQueue queue;
+  grpc::ClientContext context;
+  const grpc::Slice slice(request);
+  const auto call = stub.PrepareUnaryCall(&context, method, grpc::ByteBuffer(&slice, 1), &queue);
+  call->StartCall();
+  grpc::ByteBuffer response;
+  grpc::Status status;
+  call->Finish(&response, &status, nullptr);
+  void* tag = nullptr;
+  bool ok = false;
+  EXPECT_TRUE(queue.Next(&tag, &ok));
+  grpc::Slice bytes;
+  if (response.Valid()) response.DumpToSingleSlice(&bytes);
+  return {std::string(bytes.begin(), bytes.end()), Error(status)};
 }
 
 v1::StreamFramesRequest frames_of(const v1::Session& session, std::int64_t start,

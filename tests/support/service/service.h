@@ -5,7 +5,9 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "google/rpc/error_details.pb.h"
@@ -95,6 +97,10 @@ class Stream {
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReader<v1::StreamFramesResponse>> reader_;
 };
+
+// A call by bytes alone: what a method answers, and its error.
+std::pair<std::string, Error> raw_call(Service& service, const std::string& method,
+                                       const std::string& request);
 
 // From `start` on, to `end` where it is not below 0.
 v1::StreamFramesRequest frames_of(const v1::Session& session, std::int64_t start = 0,

@@ -1,16 +1,16 @@
 #include "core/plan.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <sstream>
 
 #include "core/motion/stability.h"
 
 namespace weft {
 namespace {
-
-constexpr double kStandardGravity = 9.80665;  // m/s^2
 
 template <class... Parts>
 std::string join(const Parts&... parts) {
@@ -22,13 +22,19 @@ std::string join(const Parts&... parts) {
 
 std::string sheet_path(std::size_t index) { return "sheets[" + std::to_string(index) + "]"; }
 
-// Rate at which wind damps a sheet, an upper estimate that takes the sheet as nearly at rest, 1/s.
+// Rate at which air damps a sheet that is nearly at rest, an upper estimate, 1/s. Verlet takes drag
+// centred, which no step is too long for.
 double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& mesh) {
-  if (!scene.environment.wind) return 0;
-  const Wind& wind = *scene.environment.wind;
-  const double h = sheet.grid.spacing;
-  const double speed = wind.velocity.norm() * (1 + wind.gust);
-  return (wind.air_density * speed + wind.tangential_drag) * h * h / mesh.mass.minCoeff();
+  double rate = 0;
+  if (scene.solver.integrator != IntegratorKind::kVerlet)
+    rate += mesh.drag.cwiseQuotient(mesh.mass).maxCoeff();
+  if (scene.environment.wind) {
+    const Wind& wind = *scene.environment.wind;
+    const double h = sheet.grid.spacing;
+    const double speed = wind.velocity.norm() * (1 + wind.gust);
+    rate += (wind.air_density * speed + wind.tangential_drag) * h * h / mesh.mass.minCoeff();
+  }
+  return rate;
 }
 
 StepPlan plan_step(const Scene& scene, const std::vector<SheetShape>& shapes) {
@@ -90,10 +96,48 @@ void describe_families(const SheetDefinition& sheet, const Mesh& mesh, Plan& pla
     plan.skipped.push_back({join(sheet.name, ": drag"), "the textile has no air drag"});
 }
 
+// B and c_b along warp and weft, N m and N/m, and the weight of an area, Pa.
+struct Stiffness {
+  double weight;
+  std::array<std::pair<double, double>, 2> rigidity_and_clamp;
+};
+Stiffness stiffness_of(const SheetDefinition& sheet, double gravity) {
+  if (const auto* raw = std::get_if<RawTextile>(&sheet.textile.model)) {
+    const double h = sheet.grid.spacing;
+    const std::pair both(1.5 * raw->bend / h, raw->clamp.value_or(raw->stretch));  // k_b = 2/3 B h
+    return {raw->particle_mass / (h * h) * gravity, {both, both}};
+  }
+  const auto& measured = std::get<MeasuredTextile>(sheet.textile.model);
+  return {measured.areal_density * gravity,
+          {std::pair(measured.bend_rigidity_warp, measured.tensile_warp),
+           std::pair(measured.bend_rigidity_weft, measured.tensile_weft)}};
+}
+
+// kappa*, the largest of all axes, and h_min = (96 B / (c_b kappa^2))^(1/4) / 2 at the curvature
+// that the sheet's weight gives it, kappa = (rho g / B)^(1/3).
+std::optional<BendingLimit> bending_limit(const Scene& scene, const SheetDefinition& sheet,
+                                          const Mesh& mesh) {
+  BendingLimit limit{sheet.name, 0, 0};
+  for (const Family& family : mesh.families)
+    if (family.kind == FamilyKind::kBend && family.bend)
+      limit.least_curvature = std::max(limit.least_curvature, family.bend->least_curvature());
+  if (limit.least_curvature == 0) return std::nullopt;
+
+  const double given = scene.environment.gravity.norm();
+  const Stiffness stiffness = stiffness_of(sheet, given > 0 ? given : kStandardGravity);
+  for (const auto& [rigidity, clamp] : stiffness.rigidity_and_clamp) {
+    if (rigidity == 0 || clamp == 0) continue;
+    const double kappa = std::cbrt(stiffness.weight / rigidity);
+    limit.finest_spacing =
+        std::max(limit.finest_spacing, std::pow(96 * rigidity / (clamp * kappa * kappa), 0.25) / 2);
+  }
+  return limit;
+}
+
 void warn_of_bending(const Scene& scene, std::size_t index, const Mesh& mesh, Plan& plan) {
   const SheetDefinition& sheet = scene.sheets[index];
   const auto* law = std::get_if<ChoiKo>(&sheet.bending);
-  if (law == nullptr || law->fold_clamp) return;
+  if (law == nullptr) return;
 
   std::size_t inert = 0, bending = 0;
   for (const Family& family : mesh.families) {
@@ -107,27 +151,40 @@ void warn_of_bending(const Scene& scene, std::size_t index, const Mesh& mesh, Pl
               " bend connection: the clamp of eq. 5 rules there, so k_b and the evaluator have no "
               "effect. Use a smaller k_b, a larger c_b, a larger spacing, or ISOMETRIC")});
 
-  const auto* measured = std::get_if<MeasuredTextile>(&sheet.textile.model);
-  if (measured == nullptr) return;
-  // h_min = (96 B / (c_b kappa^2))^(1/4) / 2 with kappa = (rho g / B)^(1/3): bending below it is
-  // lost
-  const double gravity = scene.environment.gravity.norm();
-  const double weight = measured->areal_density * (gravity > 0 ? gravity : kStandardGravity);
-  double finest = 0;
-  for (const auto& [rigidity, clamp] :
-       {std::pair(measured->bend_rigidity_warp, measured->tensile_warp),
-        std::pair(measured->bend_rigidity_weft, measured->tensile_weft)}) {
-    if (rigidity <= 0 || clamp <= 0) continue;
-    const double kappa = std::cbrt(weight / rigidity);
-    finest = std::max(finest, std::pow(96 * rigidity / (clamp * kappa * kappa), 0.25) / 2);
-  }
-  if (sheet.grid.spacing < finest)
+  const auto limit = bending_limit(scene, sheet, mesh);
+  if (!limit) return;
+  plan.bending_limits.push_back(*limit);
+  if (sheet.grid.spacing < limit->finest_spacing)
     plan.warnings.push_back(
         {"MESH_TOO_FINE", sheet_path(index) + ".grid.spacing_m",
          join(
-             "a spacing of ", sheet.grid.spacing, " m is below ", finest,
+             "a spacing of ", sheet.grid.spacing, " m is below ", limit->finest_spacing,
              " m, under which interlaced connections lose the bending rigidity of this textile: it "
              "will hang too limp. Use a larger spacing or ISOMETRIC")});
+
+  const auto* measured = std::get_if<MeasuredTextile>(&sheet.textile.model);
+  if (measured == nullptr || !law->diagonal_bend) return;
+  const auto [soft, stiff] =
+      std::minmax(measured->bend_rigidity_warp, measured->bend_rigidity_weft);
+  if (stiff > 5 * soft)
+    plan.warnings.push_back(
+        {"BENDING_TOO_UNEQUAL", sheet_path(index) + ".textile.measured",
+         join("the rigidities of ", soft, " and ", stiff,
+              " N m are more than 5 apart: the diagonals alone are stiffer than the softer "
+              "direction. Turn diagonal_bend off, or use ISOMETRIC")});
+}
+
+// Held at constant width, the diagonals pull along with the threads.
+void warn_of_tension(const SheetDefinition& sheet, std::size_t index, Plan& plan) {
+  const auto* measured = std::get_if<MeasuredTextile>(&sheet.textile.model);
+  if (measured == nullptr) return;
+  const double softest = std::min(measured->tensile_warp, measured->tensile_weft);
+  if (2 * measured->shear > 0.1 * softest)
+    plan.warnings.push_back({"SHEAR_STIFFENS_TENSION",
+                             sheet_path(index) + ".textile.measured.shear_n_per_m",
+                             join("a strip held at constant width measures E + 2 G, up to ",
+                                  softest + 2 * measured->shear, " instead of ", softest,
+                                  " N/m: the shear connections pull along with the threads")});
 }
 
 void warn(const Scene& scene, const std::vector<SheetShape>& shapes, Plan& plan) {
@@ -141,7 +198,10 @@ void warn(const Scene& scene, const std::vector<SheetShape>& shapes, Plan& plan)
           {"BOX_EDGES", "colliders[" + std::to_string(c) + "].box",
            "only particles are kept out: an edge of the box may cut through the "
            "cells between them"});
-  for (std::size_t s = 0; s < shapes.size(); ++s) warn_of_bending(scene, s, shapes[s].mesh, plan);
+  for (std::size_t s = 0; s < shapes.size(); ++s) {
+    warn_of_bending(scene, s, shapes[s].mesh, plan);
+    warn_of_tension(scene.sheets[s], s, plan);
+  }
   if (plan.step.substep > plan.step.linear_bound)
     plan.warnings.push_back(
         {"STEP_UNSTABLE", "solver.substep_s",

@@ -29,11 +29,19 @@ struct Warning {
   std::string message;
 };
 
+// Where interlaced connections bend a sheet as its rigidity says, and where they no longer do.
+struct BendingLimit {
+  std::string sheet;
+  double least_curvature = 0;  // kappa*, 1/m: a sheet that is less bent resists too little
+  double finest_spacing = 0;   // h_min, m, for the curvature that weight gives the textile
+};
+
 // What a scene needs: derived once, before the run.
 struct Plan {
   StepPlan step;
   std::vector<std::string> passes;
   std::vector<SkippedPass> skipped;
+  std::vector<BendingLimit> bending_limits;  // of sheets with CHOI_KO bending
   std::vector<Warning> warnings;
 };
 

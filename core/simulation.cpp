@@ -12,8 +12,6 @@
 namespace weft {
 namespace {
 
-constexpr double kStandardGravity = 9.80665;  // m/s^2
-
 // A sheet in motion.
 struct Sheet {
   Mesh mesh;

@@ -73,17 +73,18 @@ void resolve_contacts(std::span<const Collider> colliders, double friction, doub
                       std::sqrt(friction * collider.friction)});
   }
 
-  // bodies that overlap hand a particle to and fro; a few rounds bring it out of both
-  constexpr int kRounds = 16;
+  // a body may push a particle into another one: rounds go on until one moves it no further
+  constexpr int kRounds = 32;
+  constexpr double kNothing = 1e-12;  // m
   for (Eigen::Index i = 0; i < x.cols(); ++i) {
     if (inverse_mass[i] == 0) continue;
     for (int round = 0; round < kRounds; ++round) {
-      int touched = 0;
+      double deepest = 0;
       for (const auto& [collider, offset, carried, mu] : placed) {
         const auto [value, normal] = distance_at(collider, offset, x.col(i));
         if (!(value < skin)) continue;
-        ++touched;
         const double depth = skin - value;
+        deepest = std::max(deepest, depth);
         const Vector3d relative = d.col(i) - carried;
         const double approach = relative.dot(normal);
 
@@ -99,7 +100,7 @@ void resolve_contacts(std::span<const Collider> colliders, double friction, doub
         x.col(i) -= stopped;
         d.col(i) -= stopped;
       }
-      if (touched < 2) break;
+      if (deepest <= kNothing || placed.size() == 1) break;
     }
   }
 }

@@ -220,10 +220,12 @@ BendingForce::BendingForce(const ChoiKo& law, double bend, double clamp, double 
   function_ = make_function(law, normalized);
   if (law.evaluator == Evaluator::kLinearized && law.fold_clamp) {
     curve_end_ = 2;  // the table holds the clamp
+    clamp_rules_ = normalized < kClampRules;
     return;
   }
   std::tie(curve_begin_, curve_end_) =
       std::visit([&](const auto& g) { return range_of_curve(g, normalized); }, function_);
+  clamp_rules_ = curve_begin_ >= curve_end_;
 }
 
 double BendingForce::energy(double length) const {
@@ -233,13 +235,17 @@ double BendingForce::energy(double length) const {
     return clamp_ / 2 * rest_length_ * rest_length_ *
            ((1 - to) * (1 - to) - (1 - from) * (1 - from));
   };
-  if (clamp_rules() || r >= end) return clamp_energy(1, r);
+  if (clamp_rules_ || r >= end) return clamp_energy(1, r);
   const double curve = std::visit(
       [&](const auto& g) {
         return scale_ * rest_length_ * (g.integral(std::max(r, curve_begin_)) - g.integral(end));
       },
       function_);
   return clamp_energy(1, end) + curve + (r < curve_begin_ ? clamp_energy(curve_begin_, r) : 0);
+}
+
+double BendingForce::least_curvature() const {
+  return std::sqrt(288 * scale_ / (clamp_ * rest_length_ * rest_length_ * rest_length_));
 }
 
 double BendingForce::slope(double length) const {
@@ -254,7 +260,7 @@ double BendingForce::slope(double length) const {
 }
 
 double BendingForce::largest_slope() const {
-  return clamp_rules() ? clamp_ : std::max(clamp_, kSlopeAtZero * scale_ * inverse_length_);
+  return clamp_rules_ ? clamp_ : std::max(clamp_, kSlopeAtZero * scale_ * inverse_length_);
 }
 
 }  // namespace weft

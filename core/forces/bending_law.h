@@ -78,14 +78,17 @@ class BendingForce {
   double energy(double length) const;  // J
   double slope(double length) const;   // d force / d length, N/m
   double largest_slope() const;        // bound of slope() over all lengths, N/m
+  // kappa* = sqrt(288 k_b / (c_b L^5)), 1/m: less bent than this, the clamp holds the connection.
+  double least_curvature() const;
   // Whether the clamp rules for every length, so that k_b has no effect.
-  bool clamp_rules() const { return curve_begin_ >= curve_end_; }
+  bool clamp_rules() const { return clamp_rules_; }
 
  private:
   BendingFunction function_;
   double rest_length_, inverse_length_;
-  double scale_;                            // k_b / L^2
-  double clamp_;                            // c_b
+  double scale_;  // k_b / L^2
+  double clamp_;  // c_b
+  bool clamp_rules_ = true;
   double curve_begin_ = 0, curve_end_ = 0;  // range of r in which g rules, not the clamp
 };
 

@@ -98,8 +98,11 @@ struct Wind {
   double tangential_drag = 0;            // c_t, kg/(m^2 s)
 };
 
+// Stands in where a scene has no gravity and weight is a yardstick, m/s^2.
+inline constexpr double kStandardGravity = 9.80665;
+
 struct Environment {
-  Vector3d gravity{0, -9.80665, 0};  // m/s^2
+  Vector3d gravity{0, -kStandardGravity, 0};  // m/s^2
   std::optional<Wind> wind;
 };
 

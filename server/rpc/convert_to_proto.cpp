@@ -217,6 +217,12 @@ v1::Plan to_proto(const Plan& plan) {
     added->set_field(warning.field);
     added->set_message(warning.message);
   }
+  for (const auto& limit : plan.bending_limits) {
+    v1::BendingLimit* added = result.add_bending_limits();
+    added->set_sheet(limit.sheet);
+    added->set_least_curvature_per_m(limit.least_curvature);
+    added->set_finest_spacing_m(limit.finest_spacing);
+  }
   return result;
 }
 

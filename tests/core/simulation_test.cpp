@@ -128,8 +128,15 @@ TEST(Simulation, APlanWarnsOfWhatTheModelLeavesOut) {
 
 // c_b L^3 / k_b = 2000 x 0.1^3 / k_b falls below 31.47 at k_b = 0.0636; L is 0.1 on the axes.
 TEST(Simulation, APlanWarnsWhereTheClampLeavesTheBendingConstantWithoutEffect) {
-  EXPECT_FALSE(warns(hanging(0.063), "CLAMP_RULES"));
-  EXPECT_TRUE(warns(hanging(0.064), "CLAMP_RULES"));
+  for (const bool fold_clamp : {false, true}) {
+    const auto scene_with = [&](double bend) {
+      Scene scene = hanging(bend);
+      scene.sheets[0].bending = ChoiKo{.fold_clamp = fold_clamp};
+      return scene;
+    };
+    EXPECT_FALSE(warns(scene_with(0.063), "CLAMP_RULES"));
+    EXPECT_TRUE(warns(scene_with(0.064), "CLAMP_RULES"));
+  }
 }
 
 TEST(Simulation, UnderTheClampTwoBendingConstantsGiveTheSameBits) {
@@ -139,23 +146,50 @@ TEST(Simulation, UnderTheClampTwoBendingConstantsGiveTheSameBits) {
   EXPECT_EQ(positions(soft), positions(stiff));
 }
 
-// h_min = (96 B / (c_b kappa^2))^(1/4) / 2, kappa = (rho g / B)^(1/3): 4.2 mm for this cloth.
+Scene measured_scene(double spacing, const MeasuredTextile& textile) {
+  Scene scene = hanging();
+  scene.sheets[0].grid.spacing = spacing;
+  scene.sheets[0].textile.model = textile;
+  return scene;
+}
+
+MeasuredTextile cotton() {
+  return {.areal_density = 0.15,
+          .tensile_warp = 2000,
+          .tensile_weft = 2000,
+          .shear = 50,
+          .bend_rigidity_warp = 1e-5,
+          .bend_rigidity_weft = 1e-5};
+}
+
+// h_min = (96 B / (c_b kappa^2))^(1/4) / 2 with kappa = (rho g / B)^(1/3).
 TEST(Simulation, APlanWarnsOfAMeshTooFineForInterlacedConnections) {
-  const auto scene_with = [](double h) {
-    Scene scene = hanging();
-    scene.sheets[0].grid.spacing = h;
-    scene.sheets[0].textile.model = MeasuredTextile{.areal_density = 0.15,
-                                                    .tensile_warp = 2000,
-                                                    .tensile_weft = 2000,
-                                                    .shear = 50,
-                                                    .bend_rigidity_warp = 1e-5,
-                                                    .bend_rigidity_weft = 1e-5};
-    return scene;
-  };
   const double kappa = std::cbrt(0.15 * 9.8 / 1e-5);
   const double finest = std::pow(96 * 1e-5 / (2000 * kappa * kappa), 0.25) / 2;
-  EXPECT_FALSE(warns(scene_with(1.01 * finest), "MESH_TOO_FINE"));
-  EXPECT_TRUE(warns(scene_with(0.99 * finest), "MESH_TOO_FINE"));
+  EXPECT_FALSE(warns(measured_scene(1.01 * finest, cotton()), "MESH_TOO_FINE"));
+  EXPECT_TRUE(warns(measured_scene(0.99 * finest, cotton()), "MESH_TOO_FINE"));
+}
+
+// kappa* = sqrt(288 k_b / (c_b L^5)), k_b = 4/9 B h.
+TEST(Simulation, APlanStatesWhereBendingIsLost) {
+  const double h = 0.01, length = 2 * h, k_b = 4.0 / 9 * 1e-5 * h;
+  const Plan plan = Simulation(measured_scene(h, cotton())).plan();
+  ASSERT_EQ(plan.bending_limits.size(), 1u);
+  EXPECT_NEAR(plan.bending_limits[0].least_curvature,
+              std::sqrt(288 * k_b / (2000 * std::pow(length, 5))), 1e-9);
+  Scene isometric = measured_scene(h, cotton());
+  isometric.sheets[0].bending = Isometric{};
+  EXPECT_TRUE(Simulation(isometric).plan().bending_limits.empty());
+}
+
+TEST(Simulation, APlanWarnsOfTextilesThatALatticeCannotFollow) {
+  MeasuredTextile textile = cotton();
+  EXPECT_FALSE(warns(measured_scene(0.05, textile), "SHEAR_STIFFENS_TENSION"));
+  EXPECT_FALSE(warns(measured_scene(0.05, textile), "BENDING_TOO_UNEQUAL"));
+  textile.shear = 101;  // 2 G = 0.101 E
+  textile.bend_rigidity_weft = 5.1e-5;
+  EXPECT_TRUE(warns(measured_scene(0.05, textile), "SHEAR_STIFFENS_TENSION"));
+  EXPECT_TRUE(warns(measured_scene(0.05, textile), "BENDING_TOO_UNEQUAL"));
 }
 
 TEST(Simulation, ASheetComesToRestAndIsToldSo) {

@@ -134,6 +134,22 @@ TEST(StableStep, KeepsDampedEulerMidpointAndRungeKuttaFromGrowing) {
   }
 }
 
+TEST(StableStep, StrongDragShortensTheStepOfThoseThatTakeItExplicitly) {
+  for (const auto integrator : {IntegratorKind::kVerlet, IntegratorKind::kEuler,
+                                IntegratorKind::kMidpoint, IntegratorKind::kRk4}) {
+    SheetDefinition sheet = flat_sheet(4, 4);
+    std::get<RawTextile>(sheet.textile.model).air_drag = 50;
+    sheet.start_velocities = values(noise(16));
+    Scene scene = floating(sheet);
+    scene.solver.integrator = integrator;
+    scene.solver.frame_step = 1e-3;
+    Simulation simulation(scene);
+    ASSERT_FALSE(simulation.refusal());
+    for (int frame = 0; frame < 20; ++frame) ASSERT_TRUE(simulation.advance_frame());
+    EXPECT_LT(velocities(simulation).cwiseAbs().maxCoeff(), 1) << static_cast<int>(integrator);
+  }
+}
+
 TEST(StableStep, AnAskedStepAboveTheBoundIsRefusedUnlessAllowed) {
   Scene scene = floating(flat_sheet(5, 5));
   const double bound = Simulation(scene).plan().step.linear_bound;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <variant>
 #include <vector>
 
@@ -70,6 +71,7 @@ Value value_of(const toml::node& node, const std::string& where, const char* typ
 }
 
 void read_file(const std::string& path, Config& config) {
+  if (!std::filesystem::is_regular_file(path)) refuse(path + " is no file");
   toml::table table;
   try {
     table = toml::parse_file(path);
@@ -150,8 +152,8 @@ Config read_config(int argc, const char* const* argv) {
     const std::string flag = flag_of(known[i].key);
     if (app.count(flag) > 0) set(known[i], values[i], flag);
   }
-  if (!host.empty()) config.server.host = host;
-  if (!log_level.empty()) set_log_level(config, log_level, "--log-level");
+  if (app.count("--host") > 0) config.server.host = host;
+  if (app.count("--log-level") > 0) set_log_level(config, log_level, "--log-level");
   config.insecure |= insecure;
   if (!is_loopback(*config.server.host) && !config.insecure) {
     refuse("host is " + *config.server.host +

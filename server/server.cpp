@@ -18,6 +18,9 @@ namespace {
 constexpr std::array kServices = {"", "weft.v1.SessionService", "weft.v1.FrameService",
                                   "weft.v1.ServerService", "weft.v1.TextileService"};
 
+// For calls that are answered at once, when gRPC is shut down.
+constexpr std::chrono::milliseconds kGrace{200}, kNoGrace{0};
+
 void set_transport(grpc::ServerBuilder& builder, const Limits& limits) {
   using std::chrono::milliseconds, std::chrono::seconds;
   const auto ms = [](milliseconds time) { return static_cast<int>(time.count()); };
@@ -70,7 +73,8 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
   parts_->grpc = builder.BuildAndStart();
   if (!parts_->grpc || (options.host && port == 0)) {
     throw std::runtime_error("cannot listen on " + options.host.value_or("") + ":" +
-                             std::to_string(options.port) + ": is the port taken?");
+                             std::to_string(options.port) +
+                             ": is the port taken, or the address another machine's?");
   }
   if (options.host) address_ = *options.host + ":" + std::to_string(port);
   for (const char* service : kServices) {
@@ -78,10 +82,15 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
   }
 }
 
-Server::~Server() { stop(); }
+Server::~Server() {
+  stop();
+  parts_->backend.planner.stop();  // the scene it is at still needs the services
+}
 
 std::shared_ptr<grpc::Channel> Server::in_process_channel() {
-  return parts_->grpc->InProcessChannel({});
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(-1);
+  return parts_->grpc->InProcessChannel(arguments);
 }
 
 void Server::stop(std::chrono::milliseconds deadline) {
@@ -89,11 +98,13 @@ void Server::stop(std::chrono::milliseconds deadline) {
   parts_->grpc->GetHealthCheckService()->Shutdown();  // NOT_SERVING
   parts_->backend.draining = true;
 
-  // gRPC waits for every call for ever: end them all ourselves
+  // end every call ourselves, and let the answers leave: gRPC would wait for ever, or drop them
+  const auto end = Clock::now() + deadline;
   parts_->frames.drain();
   parts_->backend.registry.close(Refusal::Why::kDraining);
-  parts_->backend.scheduler.run_posted();
-  parts_->grpc->Shutdown(std::chrono::system_clock::now() + deadline);
+  parts_->sessions.drain();
+  const bool ended = parts_->backend.calls.wait_for_none(end);
+  parts_->grpc->Shutdown(std::chrono::system_clock::now() + (ended ? kGrace : kNoGrace));
 }
 
 }  // namespace weft

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstddef>
 
+#include "server/rpc/open_calls.h"
 #include "server/session/limits.h"
 #include "server/session/registry.h"
 #include "server/session/scheduler.h"
@@ -10,6 +11,7 @@
 namespace weft {
 
 // What the services share. The registry goes first, while sessions can still reach the scheduler.
+// Scenes are planned on a thread of their own, so that a large one holds up no session.
 struct Backend {
   Backend(const Limits& given, int threads)
       : limits(given),
@@ -20,7 +22,9 @@ struct Backend {
   const Limits limits;
   const int worker_threads;
   std::atomic<bool> draining = false;  // sessions are not created or changed any more
+  OpenCalls calls;
   Scheduler scheduler;
+  Scheduler planner{1};
   Registry registry;
 };
 

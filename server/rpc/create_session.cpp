@@ -5,6 +5,7 @@
 #include "server/rpc/errors.h"
 #include "server/rpc/names.h"
 #include "server/rpc/session_service.h"
+#include "server/rpc/unary_call.h"
 
 namespace weft {
 namespace {
@@ -19,6 +20,11 @@ std::int64_t particles_of(const Scene& scene) {
 
 grpc::Status refused_step(const Simulation& simulation, const StepRefusal& refusal) {
   const std::string solver = "session.scene.solver.";
+  if (refusal.too_many_substeps && refusal.bound == 0) {
+    return errors::field_invalid(solver + "substep_s",
+                                 "is absent, and this integrator has no stable step for this scene "
+                                 "to plan with; give one");
+  }
   if (refusal.too_many_substeps) {
     return errors::field_invalid(
         solver + "frame_step_s",
@@ -45,27 +51,75 @@ grpc::Status refused(Registry::Refused refused, const std::string& id, const Lim
 
 }  // namespace
 
+// A call whose scene is being planned; answered once, by the planner or by a server that goes down.
+class SessionService::Creation {
+ public:
+  Creation(const v1::CreateSessionRequest& asked, v1::Session* response,
+           grpc::ServerUnaryReactor* reactor)
+      : request(asked), response_(response), reactor_(reactor) {}
+
+  void answer(const grpc::Status& status, v1::Session session = {}) {
+    std::lock_guard lock(mutex_);
+    if (reactor_ == nullptr) return;
+    *response_ = std::move(session);
+    std::exchange(reactor_, nullptr)->Finish(status);
+  }
+
+  const v1::CreateSessionRequest request;  // a copy: it may outlive the call
+
+ private:
+  std::mutex mutex_;
+  v1::Session* response_;
+  grpc::ServerUnaryReactor* reactor_;  // null: answered
+};
+
+bool SessionService::begin(const std::shared_ptr<Creation>& creation) {
+  std::lock_guard lock(mutex_);
+  if (backend_.draining) return false;
+  creations_.insert(creation);
+  return true;
+}
+
+void SessionService::end(const std::shared_ptr<Creation>& creation) {
+  std::lock_guard lock(mutex_);
+  creations_.erase(creation);
+}
+
+void SessionService::drain() {
+  std::lock_guard lock(mutex_);
+  for (const auto& creation : creations_) creation->answer(errors::server_draining());
+}
+
 // Planning a scene takes its time: not on a thread of gRPC's.
-grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
+grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext*,
                                                         const v1::CreateSessionRequest* request,
                                                         v1::Session* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const bool posted = backend_.scheduler.post([this, context, request, response, reactor] {
+  auto* reactor = new UnaryCall(backend_.calls);
+  const auto creation = std::make_shared<Creation>(*request, response, reactor);
+  if (!begin(creation)) {
+    creation->answer(errors::server_draining());
+    return reactor;
+  }
+  const bool posted = backend_.planner.post([this, creation] {
     try {
-      reactor->Finish(context->IsCancelled() ? errors::cancelled() : create(*request, *response));
+      v1::Session session;
+      const grpc::Status status = create(creation->request, session);
+      creation->answer(status, std::move(session));
     } catch (const std::bad_alloc&) {
-      reactor->Finish(errors::exhausted("memory", "the server has no memory for this scene", true));
+      creation->answer(
+          errors::exhausted("memory", "the server has no memory for this scene", true));
     }
+    end(creation);
   });
   if (!posted) {
-    reactor->Finish(errors::exhausted("creations", "too many sessions are being created", true));
+    end(creation);
+    creation->answer(errors::exhausted("creations", "too many sessions are being created", true));
   }
   return reactor;
 }
 
 grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
                                     v1::Session& response) {
-  if (backend_.draining) return errors::server_draining();
   if (!request.session_id().empty() && !is_session_id(request.session_id())) {
     return errors::field_invalid("session_id", "\"" + request.session_id() +
                                                    "\" is not 1 to 63 characters of a-z, 0-9 and "

@@ -21,7 +21,8 @@ class FrameStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
                           public FrameSink,
                           public std::enable_shared_from_this<FrameStream> {
  public:
-  FrameStream(Backend& backend, FrameStreams& streams) : backend_(backend), streams_(streams) {}
+  FrameStream(Backend& backend, FrameStreams& streams)
+      : backend_(backend), streams_(streams), ticket_(backend.calls) {}
 
   // Called once, first.
   void start(const grpc::ByteBuffer& request);
@@ -46,6 +47,7 @@ class FrameStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
 
   Backend& backend_;
   FrameStreams& streams_;
+  OpenCalls::Ticket ticket_;
   std::shared_ptr<FrameStream> self_;  // until OnDone
 
   std::mutex mutex_;  // guards all below

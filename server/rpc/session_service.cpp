@@ -6,6 +6,7 @@
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/names.h"
+#include "server/rpc/unary_call.h"
 
 namespace weft {
 namespace {
@@ -53,45 +54,25 @@ grpc::Status to_status(const Refusal& refusal, const Session& session) {
                                               " substeps, the most that are computed");
 }
 
-// Finishes `reactor` with what becomes of a command; `fill` writes the response.
+// Submits a command, and finishes the call with what becomes of it; `fill` writes the response.
 template <class Fill>
-Done finish_with(grpc::ServerUnaryReactor* reactor, std::shared_ptr<Session> session, Fill fill) {
-  return [reactor, session = std::move(session), fill](const Outcome& outcome) {
+grpc::ServerUnaryReactor* submit(OpenCalls& calls, const std::shared_ptr<Session>& session,
+                                 auto command, Fill fill, std::stop_source caller = {}) {
+  auto* call = new UnaryCall(calls, [session, caller]() mutable {
+    caller.request_stop();
+    session->wake();
+  });
+  command.done = [call, session, fill](const Outcome& outcome) {
     if (const auto* refusal = std::get_if<Refusal>(&outcome)) {
-      reactor->Finish(to_status(*refusal, *session));
+      call->Finish(to_status(*refusal, *session));
     } else {
       fill(std::get<Applied>(outcome));
-      reactor->Finish(grpc::Status::OK);
+      call->Finish(grpc::Status::OK);
     }
   };
-}
-
-template <class Fill>
-grpc::ServerUnaryReactor* submit(grpc::CallbackServerContext* context,
-                                 const std::shared_ptr<Session>& session, auto command, Fill fill) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  command.done = finish_with(reactor, session, fill);
   session->submit(std::move(command));
-  return reactor;
+  return call;
 }
-
-// A step that ends with its caller.
-class StepCall final : public grpc::ServerUnaryReactor {
- public:
-  explicit StepCall(std::shared_ptr<Session> session) : session_(std::move(session)) {}
-
-  std::stop_token cancelled() const { return source_.get_token(); }
-
-  void OnCancel() override {
-    source_.request_stop();
-    session_->wake();
-  }
-  void OnDone() override { delete this; }
-
- private:
-  std::stop_source source_;
-  std::shared_ptr<Session> session_;
-};
 
 // Index of the sheet, or why there is none.
 std::variant<std::size_t, grpc::Status> find_sheet(const Scene& scene, const std::string& name) {
@@ -159,7 +140,7 @@ grpc::Status SessionService::erase(const v1::DeleteSessionRequest& request) {
   if (backend_.draining) return errors::server_draining();
   const auto found = find_session(backend_.registry, request.name());
   if (const auto* session = std::get_if<std::shared_ptr<Session>>(&found)) {
-    backend_.registry.erase((*session)->id());
+    backend_.registry.erase(*session);
     return grpc::Status::OK;
   }
   const auto& error = std::get<grpc::Status>(found);
@@ -184,7 +165,7 @@ grpc::ServerUnaryReactor* SessionService::UpdateTextile(grpc::CallbackServerCont
       [request](const Textile& current) {  // the request lives until the call is finished
         return merge_textile(current, request->textile(), request->update_mask());
       };
-  return submit(context, session, std::move(command), [response](const Applied& applied) {
+  return submit(backend_.calls, session, std::move(command), [response](const Applied& applied) {
     response->set_applied_frame(applied.frame);
     *response->mutable_textile() = to_proto(applied.textile);
     *response->mutable_plan() = to_proto(*applied.plan);
@@ -206,16 +187,15 @@ grpc::ServerUnaryReactor* SessionService::StepSession(grpc::CallbackServerContex
   }
   if (request->has_expected_frame()) command.expected_frame = request->expected_frame();
 
-  auto* call = new StepCall(session);  // deletes itself in OnDone
-  command.cancelled = call->cancelled();
-  command.done = finish_with(call, session, [response](const Applied& applied) {
+  std::stop_source caller;
+  command.cancelled = caller.get_token();
+  const auto fill = [response](const Applied& applied) {
     response->set_applied_frame(applied.frame);
     response->set_frame(applied.newest->number);
     response->set_time_s(applied.newest->time);
     response->set_at_rest(applied.newest->at_rest);
-  });
-  session->submit(std::move(command));
-  return call;
+  };
+  return submit(backend_.calls, session, std::move(command), fill, caller);
 }
 
 grpc::ServerUnaryReactor* SessionService::RunSession(grpc::CallbackServerContext* context,
@@ -235,7 +215,7 @@ grpc::ServerUnaryReactor* SessionService::RunSession(grpc::CallbackServerContext
   }
   if (request->has_until_frame()) command.until_frame = request->until_frame();
   command.until_rest = request->until_rest();
-  return submit(context, std::get<std::shared_ptr<Session>>(found), std::move(command),
+  return submit(backend_.calls, std::get<std::shared_ptr<Session>>(found), std::move(command),
                 [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
 }
 
@@ -244,7 +224,7 @@ grpc::ServerUnaryReactor* SessionService::PauseSession(grpc::CallbackServerConte
                                                        v1::PauseSessionResponse* response) {
   const auto found = find_session(backend_.registry, request->name());
   if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
-  return submit(context, std::get<std::shared_ptr<Session>>(found), PauseCommand{},
+  return submit(backend_.calls, std::get<std::shared_ptr<Session>>(found), PauseCommand{},
                 [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
 }
 

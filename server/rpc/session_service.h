@@ -1,5 +1,8 @@
 #pragma once
 
+#include <memory>
+#include <mutex>
+#include <set>
 #include <string>
 
 #include "server/rpc/backend.h"
@@ -36,7 +39,13 @@ class SessionService final : public v1::SessionService::CallbackService {
                                          const v1::PauseSessionRequest* request,
                                          v1::PauseSessionResponse* response) override;
 
+  // Answers every creation under way: the server is going down.
+  void drain();
+
  private:
+  class Creation;
+  bool begin(const std::shared_ptr<Creation>& creation);  // false: the server is going down
+  void end(const std::shared_ptr<Creation>& creation);
   grpc::Status create(const v1::CreateSessionRequest& request, v1::Session& response);
   grpc::Status get(const v1::GetSessionRequest& request, v1::Session& response) const;
   grpc::Status list(const v1::ListSessionsRequest& request,
@@ -44,6 +53,8 @@ class SessionService final : public v1::SessionService::CallbackService {
   grpc::Status erase(const v1::DeleteSessionRequest& request);
 
   Backend& backend_;
+  std::mutex mutex_;
+  std::set<std::shared_ptr<Creation>> creations_;  // guarded by mutex_
 };
 
 }  // namespace weft

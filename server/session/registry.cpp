@@ -45,14 +45,11 @@ std::size_t Registry::size() const {
   return sessions_.size();
 }
 
-void Registry::erase(const std::string& id) {
-  std::shared_ptr<Session> session;
+void Registry::erase(const std::shared_ptr<Session>& session) {
   {
     std::lock_guard lock(mutex_);
-    const auto found = sessions_.find(id);
-    if (found == sessions_.end()) return;
-    session = std::move(found->second);
-    sessions_.erase(found);
+    const auto found = sessions_.find(session->id());
+    if (found != sessions_.end() && found->second == session) sessions_.erase(found);
   }
   session->close(Refusal::Why::kDeleted);
 }

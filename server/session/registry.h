@@ -30,7 +30,7 @@ class Registry {
   std::size_t size() const;
 
   // Takes a session out and ends it, where there is one.
-  void erase(const std::string& id);
+  void erase(const std::shared_ptr<Session>& session);
 
   // Ends every session, and adds none any more. They can still be found.
   void close(Refusal::Why why);

@@ -39,19 +39,6 @@ bool Scheduler::post(std::function<void()> work) {
   return true;
 }
 
-void Scheduler::run_posted() {
-  std::vector<Job> jobs;
-  {
-    std::lock_guard lock(mutex_);
-    for (auto& job : ready_) {
-      if (job.work) jobs.push_back(std::move(job));
-    }
-    std::erase_if(ready_, [](const Job& job) { return !job.task; });
-    posted_ = 0;
-  }
-  for (const auto& job : jobs) job.work();
-}
-
 void Scheduler::stop() {
   {
     std::lock_guard lock(mutex_);

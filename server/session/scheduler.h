@@ -34,7 +34,7 @@ class Task {
 // wait for a time join when it has come; idle ones cost nothing. All methods are thread-safe.
 class Scheduler {
  public:
-  static constexpr std::size_t kMaxPosted = 1024;
+  static constexpr std::size_t kMaxPosted = 256;
 
   explicit Scheduler(int threads);
   ~Scheduler();  // stops
@@ -44,9 +44,6 @@ class Scheduler {
 
   // Runs `work` once, in its turn. False, and nothing done, when kMaxPosted already wait.
   [[nodiscard]] bool post(std::function<void()> work);
-
-  // Runs everything posted that no thread has begun, here and now.
-  void run_posted();
 
   // Lets each thread finish its slice, and drops the rest.
   void stop();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <new>
 #include <random>
 
 namespace weft {
@@ -81,13 +82,27 @@ void Session::close(Refusal::Why why) {
 }
 
 std::optional<Clock::time_point> Session::run_slice() {
-  execute_commands();
-  settle_steps();
-  const auto due = next_due();
-  if (!due || *due > Clock::now()) return due;
-  compute_frame();
+  try {
+    execute_commands();
+    settle_steps();
+    const auto due = next_due();
+    if (!due || *due > Clock::now()) return due;
+    compute_frame();
+  } catch (const std::bad_alloc&) {
+    fail("the server ran out of memory");
+  }
   settle_steps();
   return next_due();
+}
+
+void Session::fail(const std::string& why) {
+  {
+    std::lock_guard lock(mutex_);
+    failure_ = why + "; frame " + std::to_string(latest()) + " is the last";
+    run_.reset();
+    set_state(SessionState::kFailed);
+  }
+  offer_to_all();
 }
 
 void Session::execute_commands() {
@@ -144,7 +159,9 @@ void Session::execute(PauseCommand command) {
   {
     std::lock_guard lock(mutex_);
     interrupted = refuse(Refusal::Why::kInterrupted);
-    if (state_ == SessionState::kFailed) {
+    if (closed_) {
+      outcome = refuse(*closed_);
+    } else if (state_ == SessionState::kFailed) {
       outcome = refuse(Refusal::Why::kFailed);
     } else {
       steps.swap(steps_);
@@ -163,6 +180,7 @@ void Session::execute(SetTextile command) {
   const auto change = [&]() -> Outcome {
     {
       std::lock_guard lock(mutex_);
+      if (closed_) return refuse(*closed_);
       if (state_ == SessionState::kFailed) return refuse(Refusal::Why::kFailed);
     }
     const auto edited = command.edit(simulation_.scene().sheets[command.sheet].textile);
@@ -220,23 +238,18 @@ std::optional<Outcome> Session::settle(Step& step) const {
 }
 
 void Session::compute_frame() {
-  const bool good = simulation_.advance_frame();
-  const auto frame = good ? make_frame(simulation_.plan().step.substeps) : nullptr;
+  if (!simulation_.advance_frame()) {
+    return fail("the solver diverged in frame " + std::to_string(simulation_.frame() + 1) +
+                ": a position stopped being finite");
+  }
+  const auto frame = make_frame(simulation_.plan().step.substeps);
   {
     std::lock_guard lock(mutex_);
     if (closed_) return;
-    if (good) {
-      history_.push(frame, first_held_frame());
-      if (run_ && reached(*run_)) {
-        run_.reset();
-        set_state(SessionState::kPaused);
-      }
-    } else {
-      failure_ = "the solver diverged in frame " + std::to_string(latest() + 1) +
-                 ": a position stopped being finite; frame " + std::to_string(latest()) +
-                 " is the last";
+    history_.push(frame, first_held_frame());
+    if (run_ && reached(*run_)) {
       run_.reset();
-      set_state(SessionState::kFailed);
+      set_state(SessionState::kPaused);
     }
   }
   offer_to_all();

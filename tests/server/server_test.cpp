@@ -1,6 +1,9 @@
 #include "server/server.h"
 
+#include <atomic>
+#include <future>
 #include <thread>
+#include <vector>
 
 #include "server/config.h"
 #include "tests/support/service/service.h"
@@ -70,6 +73,43 @@ TEST(Server, StopsWithAStepUnderWay) {
   const auto begin = std::chrono::steady_clock::now();
   service.server.stop();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(60));
+}
+
+// Ten large scenes take many seconds to plan, one frame of a small one takes none.
+class WhileScenesArePlanned : public ::testing::Test {
+ protected:
+  WhileScenesArePlanned() {
+    v1::Scene large = small_scene();
+    large.mutable_sheets(0)->mutable_grid()->set_rows(250);
+    large.mutable_sheets(0)->mutable_grid()->set_columns(250);
+    for (int i = 0; i < 10; ++i)
+      creations_.push_back(std::async(std::launch::async, [this, large] {
+        const Error error = service_.create_error(large);
+        --planned_;
+        return error;
+      }));
+  }
+
+  Service service_;
+  v1::Session session_ = service_.create();
+  std::atomic<int> planned_ = 10;
+  std::vector<std::future<Error>> creations_;
+};
+
+TEST_F(WhileScenesArePlanned, OtherSessionsGoOn) {
+  EXPECT_EQ(service_.step(session_).frame(), 1);
+  EXPECT_GT(planned_, 0);
+}
+
+TEST_F(WhileScenesArePlanned, TheServerStopsAndAnswersEveryCall) {
+  while (planned_ == 10) std::this_thread::yield();  // until the calls are there
+  service_.server.stop();
+  for (auto& creation : creations_) {
+    const Error error = creation.get();
+    if (!error.reason().empty()) {
+      EXPECT_EQ(error.reason(), "SERVER_DRAINING");
+    }
+  }
 }
 
 TEST(Server, StopsWithAReaderThatDoesNotRead) {

@@ -36,14 +36,14 @@ TEST_F(RegistryTest, RefusesAnIdThatIsTakenAndOneTooMany) {
   EXPECT_FALSE(add("b"));
   EXPECT_FALSE(add("c"));
   EXPECT_EQ(add("d"), Registry::Refused::kFull);
-  registry_.erase("b");
+  registry_.erase(registry_.find("b"));
   EXPECT_FALSE(add("d"));
 }
 
 TEST_F(RegistryTest, EndsWhatItErases) {
   EXPECT_FALSE(add("a"));
   const auto session = registry_.find("a");
-  registry_.erase("a");
+  registry_.erase(registry_.find("a"));
   EXPECT_EQ(registry_.find("a"), nullptr);
   EXPECT_EQ(step(*session, 1).refused(), Refusal::Why::kDeleted);
 }

@@ -215,7 +215,8 @@ TEST(Session, RefusesCommandsWhenTooManyWait) {
   Scheduler scheduler(2);
   const auto session = make_session(scheduler);
   std::vector<Answer> answers;
-  for (std::size_t i = 0; i <= Session::kMaxCommands; ++i) {
+  constexpr std::size_t kBeingMoved = 1;  // neither waiting nor begun
+  for (std::size_t i = 0; i <= Session::kMaxCommands + kBeingMoved; ++i) {
     answers.push_back(step(*session, 1'000'000'000));
   }
   EXPECT_EQ(answers.back().refused(), Refusal::Why::kBusy);

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <grpcpp/support/server_callback.h>
+
+#include <functional>
+#include <utility>
+
+#include "server/rpc/open_calls.h"
+
+namespace weft {
+
+// A unary call that is finished later, from another thread. Deletes itself when it is done.
+class UnaryCall final : public grpc::ServerUnaryReactor {
+ public:
+  explicit UnaryCall(OpenCalls& calls, std::function<void()> on_cancel = {})
+      : ticket_(calls), on_cancel_(std::move(on_cancel)) {}
+
+  void OnCancel() override {
+    if (on_cancel_) on_cancel_();
+  }
+  void OnDone() override { delete this; }
+
+ private:
+  OpenCalls::Ticket ticket_;
+  std::function<void()> on_cancel_;
+};
+
+}  // namespace weft

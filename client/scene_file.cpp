@@ -8,7 +8,6 @@
 #include <cstring>
 #include <fstream>
 #include <regex>
-#include <sstream>
 #include <tuple>
 
 #include "client/output/json.h"
@@ -19,10 +18,10 @@ namespace {
 
 std::string read_text(const std::string& path) {
   std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file || !text) throw unreadable(path, std::strerror(errno));
-  return text.str();
+  std::string text;
+  std::getline(file, text, '\0');
+  if (!file.is_open() || file.bad()) throw unreadable(path, std::strerror(errno));
+  return text;
 }
 
 // "line 3, column 7: ..." of the JSON parser's "[json...] parse error at line 3, column 7: ..."

@@ -84,7 +84,6 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
   CLI::App app(kDescription, "weft");
   app.fallthrough();
   app.get_formatter()->column_width(36);
-  app.require_subcommand(1);
   app.footer("--server, --embedded and --json go with every command: weft --help");
   add_options(app, context);
   add_commands(app, context);
@@ -93,11 +92,11 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
   try {
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
     app.parse(std::move(arguments));
+    if (app.get_subcommands().empty()) throw usage_problem("which command? see weft --help");
     return static_cast<int>(Exit::kDone);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, terminal.out, terminal.err);
-    return report(usage_problem(std::string(error.what()) + " (weft --help, weft COMMAND --help)"),
-                  context);
+    return report(usage_problem(std::string(error.what()) + "; see --help"), context);
   } catch (const Problem& problem) {
     return report(problem, context);
   } catch (const std::exception& error) {

@@ -21,9 +21,19 @@ std::string sheets_text(const v1::Scene& scene) {
 
 }  // namespace
 
+CLI::App* add_group(CLI::App& app, const char* name, const char* description) {
+  CLI::App* group = app.add_subcommand(name, description);
+  group->callback([group, name] {
+    if (group->get_subcommands().empty()) {
+      throw usage_problem(fmt::format("which one? see weft {} --help", name));
+    }
+  });
+  return group;
+}
+
 void add_session_argument(CLI::App& command, std::string& session) {
   command.add_option("SESSION", session, "Name of the session (with --embedded: a scene file)")
-      ->type_name("")
+      ->option_text(" ")
       ->required();
 }
 

@@ -23,6 +23,9 @@ void add_demo(CLI::App& app, Context& context);
 using Sessions = v1::SessionService::Stub;
 using Textiles = v1::TextileService::Stub;
 
+// A command that only holds others.
+CLI::App* add_group(CLI::App& app, const char* name, const char* description);
+
 // The positional SESSION.
 void add_session_argument(CLI::App& command, std::string& session);
 

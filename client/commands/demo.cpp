@@ -114,19 +114,20 @@ double energy(const Run& run) {
   return run.tally.last_stats.kinetic_energy_j() + run.tally.last_stats.potential_energy_j();
 }
 
-std::string table_text(const std::vector<Run>& runs) {
-  Table table(
-      {"EXPERIMENT", "WALL", "SIMULATED", "STEPS", "STRAIN", "ENERGY AT REST", "RECORDING"});
+std::string table_text(const std::vector<Run>& runs, const std::string& directory) {
+  Table table({"EXPERIMENT", "WALL", "SIMULATED", "STEPS", "STRAIN", "AT REST", "RECORDING"});
   for (const Run& run : runs) {
     table.add({run.name, fmt::format("{:.1f} s", run.wall.count()),
                fmt::format("{:.1f} s", run.tally.last_time_s), std::to_string(run.tally.substeps),
                fmt::format("{:.2f} %", 100 * run.tally.largest_strain),
                fmt::format("{:.4f} J{}", energy(run),
                            run.tally.last_stats.at_rest() ? "" : " (in motion)"),
-               run.path + ".weft"});
+               run.name + ".weft"});
   }
-  return table.text() +
-         "\nEach with .pc2, all frames as a point cache, and -end, the last frame as OBJ.\n";
+  return fmt::format(
+      "{}\nAll in {}; beside each recording .pc2, its frames as a point cache, and\n"
+      "-end, the last one as OBJ. STRAIN: the largest. AT REST: the energy.\n",
+      table.text(), directory);
 }
 
 Json runs_json(const std::vector<Run>& runs) {
@@ -151,7 +152,7 @@ void run_demo(Context& context, const Options& options) {
   if (error) throw unwritable(options.directory, error.message());
   std::vector<Run> runs = plan_runs(options);
   perform_all(context, runs);
-  context.answer(runs_json(runs), table_text(runs));
+  context.answer(runs_json(runs), table_text(runs, options.directory));
 }
 
 }  // namespace

@@ -56,12 +56,13 @@ void add_export(CLI::App& app, Context& context) {
   ExportOrder& order = options->order;
   CLI::App* command =
       app.add_subcommand("export", "Write a recording as files that other tools open");
-  command->add_option("FILE", options->recording, "Recording")->type_name("")->required();
+  command->add_option("FILE", options->recording, "Recording")->option_text(" ")->required();
   command
       ->add_option("-f,--format", order.format,
                    "obj: a directory of meshes; pc2: point cache; csv: a row for every frame")
       ->required()
-      ->transform(CLI::CheckedTransformer(formats).description("obj|pc2|csv"));
+      ->transform(CLI::CheckedTransformer(formats))
+      ->option_text("obj|pc2|csv, REQUIRED");
   command->add_option("-o,--output", order.path, "File to write; for obj a directory")
       ->type_name("PATH")
       ->required();
@@ -69,12 +70,11 @@ void add_export(CLI::App& app, Context& context) {
       ->type_name("NAME");
   auto* frames =
       command->add_option("--frames", options->frames, "Frames A to B; either may be left out")
-          ->type_name("A:B");
-  command
-      ->add_option("--times", order.times_s,
-                   "Frames at these simulated times instead, s: 0.05,0.1,...")
-      ->type_name("S")
+          ->option_text("A:B");
+  command->add_option("--times", order.times_s, "Frames at these simulated times instead, s")
+      ->option_text("S,S,...")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->excludes(frames);
   command->callback([&context, options] { run(context, *options); });
 }

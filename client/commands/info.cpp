@@ -118,7 +118,7 @@ void add_info(CLI::App& app, Context& context) {
   auto path = std::make_shared<std::string>();
   CLI::App* command =
       app.add_subcommand("info", "Say what a recording holds, and check every frame of it");
-  command->add_option("FILE", *path, "Recording")->type_name("")->required();
+  command->add_option("FILE", *path, "Recording")->option_text(" ")->required();
   command->callback([&context, path] { run(context, *path); });
 }
 

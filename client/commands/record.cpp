@@ -95,7 +95,8 @@ void add_record(CLI::App& app, Context& context) {
                     "Let the session run, as far as it is recorded (always with --embedded)");
   command->add_flag("--velocities", order.velocities, "Velocities too");
   command->add_option("--encoding", order.encoding, "Numbers in the file [float32]")
-      ->transform(CLI::CheckedTransformer(encodings).description("float32|float64"));
+      ->transform(CLI::CheckedTransformer(encodings))
+      ->option_text("float32|float64");
   command
       ->add_option("--patience", options->patience_s,
                    "Seconds to try again after a connection broke")

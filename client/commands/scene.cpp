@@ -73,8 +73,8 @@ void add_new(CLI::App& scene, Context& context) {
   command->add_option("--bend", values.bend, "k_b in the paper's unit, 1e-4 N m^2 (paper-*)")
       ->type_name("K");
   command->add_option("--evaluator", values.evaluator, "How bending is computed")
-      ->transform(
-          CLI::CheckedTransformer(evaluators).description("series|exact|linearized|polynomial"));
+      ->transform(CLI::CheckedTransformer(evaluators))
+      ->option_text("series|exact|linearized|polynomial");
   command->add_option("--segments", values.segments, "Line segments of the linearized law")
       ->type_name("N");
   command->add_flag("--fold-clamp", values.fold_clamp, "Linearize the clamped function (eq. 5)");
@@ -86,15 +86,14 @@ void add_check(CLI::App& scene, Context& context) {
   auto path = std::make_shared<std::string>();
   CLI::App* command = scene.add_subcommand(
       "check", "Say what the solver would do for a scene, or all that is wrong with it");
-  command->add_option("FILE", *path, "Scene file")->type_name("")->required();
+  command->add_option("FILE", *path, "Scene file")->option_text(" ")->required();
   command->callback([&context, path] { run_check(context, *path); });
 }
 
 }  // namespace
 
 void add_scene(CLI::App& app, Context& context) {
-  CLI::App* scene = app.add_subcommand("scene", "Make and check scene files");
-  scene->require_subcommand(1);
+  CLI::App* scene = add_group(app, "scene", "Make and check scene files");
   add_new(*scene, context);
   add_check(*scene, context);
 }

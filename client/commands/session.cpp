@@ -58,13 +58,12 @@ void run_delete(Context& context, const DeleteOptions& options) {
 }  // namespace
 
 void add_session(CLI::App& app, Context& context) {
-  CLI::App* session = app.add_subcommand("session", "Create, show and delete sessions");
-  session->require_subcommand(1);
+  CLI::App* session = add_group(app, "session", "Create, show and delete sessions");
 
   auto create = std::make_shared<CreateOptions>();
   CLI::App* command =
       session->add_subcommand("create", "Make a session, paused at frame 0, from a scene file");
-  command->add_option("FILE", create->path, "Scene file")->type_name("")->required();
+  command->add_option("FILE", create->path, "Scene file")->option_text(" ")->required();
   command->add_option("--id", create->id, "Name of the session; else the server picks one")
       ->type_name("NAME");
   command->callback([&context, create] { run_create(context, *create); });

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <google/protobuf/util/field_mask_util.h>
 
+#include <algorithm>
 #include <charconv>
 
 #include "client/commands/commands.h"
@@ -27,6 +28,14 @@ void run_list(Context& context) {
   context.answer(to_json(all), table.text());
 }
 
+// Place of a word in the list, from 1; at its end where it is new.
+std::size_t place_in(std::vector<std::string>& list, const std::string& word) {
+  const auto found = std::find(list.begin(), list.end(), word);
+  const auto place = static_cast<std::size_t>(found - list.begin()) + 1;
+  if (found == list.end()) list.push_back(word);
+  return place;
+}
+
 void run_show(Context& context, const std::string& name) {
   v1::GetTextileRequest request;
   request.set_name(name.starts_with("textiles/") ? name : "textiles/" + name);
@@ -40,11 +49,15 @@ void run_show(Context& context, const std::string& name) {
     facts.add("missing", fmt::format("{}", fmt::join(textile.missing(), ", ")));
   if (!textile.note().empty()) facts.add("note", textile.note());
   Table table({"FIELD", "VALUE", "UNIT", "STATUS", "SOURCE"});
+  std::vector<std::string> sources;
   for (const auto& property : textile.properties()) {
     table.add({property.field(), property.value(), property.unit(), property.status(),
-               property.source()});
+               fmt::format("[{}]", place_in(sources, property.source()))});
   }
-  context.answer(to_json(textile), facts.text() + '\n' + table.text());
+  std::string notes;
+  for (std::size_t i = 0; i < sources.size(); ++i)
+    notes += fmt::format("[{}] {}\n", i + 1, sources[i]);
+  context.answer(to_json(textile), facts.text() + '\n' + table.text() + '\n' + notes);
 }
 
 struct SetOptions {
@@ -129,15 +142,14 @@ void run_set(Context& context, const SetOptions& options) {
 
 void add_textile(CLI::App& app, Context& context) {
   CLI::App* textile =
-      app.add_subcommand("textile", "Show textile presets, change the textile of a session");
-  textile->require_subcommand(1);
+      add_group(app, "textile", "Show textile presets, change the textile of a session");
 
   CLI::App* command = textile->add_subcommand("list", "List the presets");
   command->callback([&context] { run_list(context); });
 
   auto name = std::make_shared<std::string>();
   command = textile->add_subcommand("show", "Show a preset, every number with its source");
-  command->add_option("NAME", *name, "Preset, such as denim_11oz")->type_name("")->required();
+  command->add_option("NAME", *name, "Preset, such as denim_11oz")->option_text(" ")->required();
   command->callback([&context, name] { run_show(context, *name); });
 
   auto set = std::make_shared<SetOptions>();
@@ -150,7 +162,8 @@ void add_textile(CLI::App& app, Context& context) {
       command->add_option("--preset", set->preset, "The whole textile from a preset")
           ->type_name("NAME");
   command->add_option("--set", set->values, "One value, such as bend_n_m2=2e-5; may be given again")
-      ->type_name("FIELD=VALUE")
+      ->option_text("FIELD=VALUE ...")
+      ->allow_extra_args(false)
       ->excludes(preset);
   command->callback([&context, set] { run_set(context, *set); });
 }

@@ -150,7 +150,7 @@ TEST_F(CommandsTest, EveryAnswerIsOneJsonDocumentWhenAskedFor) {
            {"session", "list"},
            {"textile", "list"},
            {"textile", "show", "denim_11oz"},
-           {"textile", "set", "cloth", "--set", "bend_n_m2=2e-5"},
+           {"textile", "set", "--set", "bend_n_m2=2e-5", "cloth"},
            {"step", "cloth", "--frames", "3"},
            {"run", "cloth", "--until-frame", "6", "--wait"},
            {"record", "cloth", "--from", "0", "--to", "6", "-o", path("cloth.weft")},

@@ -87,7 +87,7 @@ TEST_F(ExportsTest, CsvOfOneSheetAndSomeFrames) {
 }
 
 TEST_F(ExportsTest, FramesAreFoundByTheirTime) {
-  ask({"export", file_, "-f", "csv", "--times", "0.1,0.05", "-o", path("a.csv")});
+  ask({"export", "-f", "csv", "-o", path("a.csv"), "--times", "0.1,0.05", file_});
   std::string heading;
   const auto rows = read_csv(read_file(path("a.csv")), heading);
   ASSERT_EQ(rows.size(), 2);

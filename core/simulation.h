@@ -52,10 +52,10 @@ class Simulation {
   void copy_velocities(std::span<double> out) const;  // m/s
   FrameStats stats() const;
 
-  // Changes a textile between frames: positions and velocities stay, the step is planned anew.
-  // Changes nothing and returns the refusal when that step must not be run.
-  // Precondition: find_problems(textile, "") is empty; sheet < scene().sheets.size().
-  std::optional<StepRefusal> set_textile(std::size_t sheet, const Textile& textile);
+  // Changes the textile of a sheet between frames: positions and velocities stay, the step is
+  // planned anew. Changes nothing and returns the refusal when that step must not be run.
+  // Precondition: find_problems(textile, "") is empty; index < scene().sheets.size().
+  std::optional<StepRefusal> set_textile(std::size_t index, const Textile& textile);
 
  private:
   struct State;

@@ -39,7 +39,7 @@ std::optional<v1::StreamFramesResponse> FrameFeed::next() {
       continue;
     }
     const grpc::Status status = reader_->Finish();
-    const bool complete = request_.has_end_frame() && request_.has_start_frame() &&
+    const bool complete = header_seen_ && request_.has_end_frame() && request_.has_start_frame() &&
                           request_.start_frame() > request_.end_frame();
     if (status.ok() || complete || connection_.stop().stop_requested()) return std::nullopt;
     open_again(status);

@@ -75,14 +75,16 @@ TEST(Server, StopsWithAStepUnderWay) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(60));
 }
 
-// Ten large scenes take many seconds to plan, one frame of a small one takes none.
+// Large scenes take seconds to plan, one frame of a small one takes none.
 class WhileScenesArePlanned : public ::testing::Test {
  protected:
+  static constexpr int kScenes = 6;
+
   WhileScenesArePlanned() {
     v1::Scene large = small_scene();
-    large.mutable_sheets(0)->mutable_grid()->set_rows(250);
-    large.mutable_sheets(0)->mutable_grid()->set_columns(250);
-    for (int i = 0; i < 10; ++i)
+    large.mutable_sheets(0)->mutable_grid()->set_rows(200);
+    large.mutable_sheets(0)->mutable_grid()->set_columns(200);
+    for (int i = 0; i < kScenes; ++i)
       creations_.push_back(std::async(std::launch::async, [this, large] {
         const Error error = service_.create_error(large);
         --planned_;
@@ -92,7 +94,7 @@ class WhileScenesArePlanned : public ::testing::Test {
 
   Service service_;
   v1::Session session_ = service_.create();
-  std::atomic<int> planned_ = 10;
+  std::atomic<int> planned_ = kScenes;
   std::vector<std::future<Error>> creations_;
 };
 
@@ -102,7 +104,7 @@ TEST_F(WhileScenesArePlanned, OtherSessionsGoOn) {
 }
 
 TEST_F(WhileScenesArePlanned, TheServerStopsAndAnswersEveryCall) {
-  while (planned_ == 10) std::this_thread::yield();  // until the calls are there
+  while (planned_ == kScenes) std::this_thread::yield();  // until the calls are there
   service_.server.stop();
   for (auto& creation : creations_) {
     const Error error = creation.get();

@@ -130,7 +130,7 @@ TEST(Scheduler, RunsATaskAtOnceThatIsWokenWhileItWaits) {
 }
 
 TEST(Scheduler, RefusesWorkWhenTooMuchIsPosted) {
-  std::promise<void> begun, go_on;
+  std::promise<void> begun, go_on, done;
   std::atomic<std::size_t> runs = 0;
   Scheduler scheduler(1);
   ASSERT_TRUE(scheduler.post([&] {
@@ -138,7 +138,6 @@ TEST(Scheduler, RefusesWorkWhenTooMuchIsPosted) {
     go_on.get_future().wait();
   }));
   begun.get_future().wait();
-  std::promise<void> done;
   for (std::size_t i = 0; i < Scheduler::kMaxPosted; ++i) {
     ASSERT_TRUE(scheduler.post([&] {
       if (++runs == Scheduler::kMaxPosted) done.set_value();

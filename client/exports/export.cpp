@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <deque>
+#include <filesystem>
 #include <optional>
 
 #include "client/exports/frame_writer.h"
@@ -108,6 +109,9 @@ ExportResult export_recording(RecordingReader& recording, const ExportOrder& ord
   auto number = numbers.next();
   if (!number) throw usage_problem(fmt::format("{} has none of these frames", recording.path()));
 
+  std::error_code error;  // there is no such file yet
+  if (std::filesystem::equivalent(order.path, recording.path(), error))
+    throw unwritable(order.path, "it is the recording itself");
   const auto writer = make_writer(order, part, *number);
   ExportResult result{.frames = 0, .particles = static_cast<std::int64_t>(part.count)};
   for (; number; number = numbers.next()) {

@@ -142,7 +142,7 @@ void FrameStream::read_on(bool progress_due) {
 }
 
 void FrameStream::write(grpc::ByteBuffer message) {
-  message_ = std::move(message);
+  message_.Swap(&message);
   writing_ = true;
   last_write_ = Clock::now();
   StartWrite(&message_);

@@ -57,6 +57,12 @@ Connection::Connection(std::unique_ptr<Embedded> server, std::string address,
 
 Connection::~Connection() = default;
 
+v1::Session Connection::get_session(const std::string& name) {
+  v1::GetSessionRequest request;
+  request.set_name(name);
+  return call(&v1::SessionService::Stub::GetSession, request);
+}
+
 void Connection::check(const grpc::Status& status) const {
   if (status.ok()) return;
   if (stop_.stop_requested()) throw interrupted();

@@ -36,6 +36,7 @@ class Connection {
     return response;
   }
 
+  v1::Session get_session(const std::string& name);  // "sessions/flag"
   v1::FrameService::Stub& frames() {
     return *std::get<std::unique_ptr<v1::FrameService::Stub>>(stubs_);
   }

@@ -1,5 +1,6 @@
 #include "client/context.h"
 
+#include "client/problem.h"
 #include "client/scene_file.h"
 
 namespace weft::client {
@@ -11,8 +12,12 @@ Connection& Context::connection() {
 }
 
 std::string Context::session_name(const std::string& session) {
-  if (!embedded) return session.starts_with("sessions/") ? session : "sessions/" + session;
-  return create_session(connection(), session).name();
+  if (embedded) throw usage_problem("this needs a server: sessions end with an --embedded one");
+  return session.starts_with("sessions/") ? session : "sessions/" + session;
+}
+
+std::string Context::session_or_scene(const std::string& given) {
+  return embedded ? create_session(connection(), given).name() : session_name(given);
 }
 
 void Context::answer(const Json& document, const std::string& text) {

@@ -24,8 +24,10 @@ class Context {
 
   // Opened when first asked for.
   Connection& connection();
-  // "sessions/flag" of "flag"; where the server is our own, the session made from that scene file.
+  // "sessions/flag" of "flag". Refused where the server is our own: it has no sessions yet.
   std::string session_name(const std::string& session);
+  // The same, but where the server is our own, the session made from that scene file.
+  std::string session_or_scene(const std::string& given);
 
   // Prints the answer: the document for scripts, the text for people.
   void answer(const Json& document, const std::string& text);

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <regex>
+#include <sstream>
 #include <tuple>
 
 #include "client/output/json.h"
@@ -18,10 +20,12 @@ namespace {
 
 std::string read_text(const std::string& path) {
   std::ifstream file(path);
-  std::string text;
-  std::getline(file, text, '\0');
-  if (!file.is_open() || file.bad()) throw unreadable(path, std::strerror(errno));
-  return text;
+  std::ostringstream text;
+  text << file.rdbuf();
+  if (!file.is_open() || std::filesystem::is_directory(path)) {
+    throw unreadable(path, std::strerror(file.is_open() ? EISDIR : errno));
+  }
+  return text.str();
 }
 
 // "line 3, column 7: ..." of the JSON parser's "[json...] parse error at line 3, column 7: ..."
@@ -63,7 +67,7 @@ v1::Scene read_scene(const std::string& path) {
 
   // protobuf says "(sheets[0].grid) rowz: Cannot find field."
   const std::string message(status.message());
-  static const std::regex kPlaced(R"(^\(?([^) ]*)\)?:? (\w+): (Cannot find field\.)$)");
+  static const std::regex kPlaced(R"(^(?:\(([^)]*)\):? )?(\w+): Cannot find field\.$)");
   std::smatch match;
   if (std::regex_match(message, match, kPlaced)) {
     const std::string parent = match[1];
@@ -79,6 +83,11 @@ v1::Session create_session(Connection& connection, const std::string& path,
   *request.mutable_session()->mutable_scene() = read_scene(path);
   return connection.call(&v1::SessionService::Stub::CreateSession, request);
 } catch (const Problem& problem) {
+  if (problem.code == "RESOURCE_EXHAUSTED" && problem.reason.empty()) {  // of gRPC itself
+    throw Problem(problem.exit, problem.code, "REQUEST_TOO_LARGE",
+                  fmt::format("{}: {} bytes are more than a request may have ({})", path,
+                              request.ByteSizeLong(), problem.what()));
+  }
   Problem placed(problem.exit, problem.code, problem.reason, place_in_file(problem.what()));
   for (const auto& [field, description] : problem.violations) {
     placed.violations.push_back({place_in_file(field), description});

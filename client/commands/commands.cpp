@@ -32,7 +32,11 @@ CLI::App* add_group(CLI::App& app, const char* name, const char* description) {
 }
 
 void add_session_argument(CLI::App& command, std::string& session) {
-  command.add_option("SESSION", session, "Name of the session (with --embedded: a scene file)")
+  command.add_option("SESSION", session, "Name of the session")->option_text(" ")->required();
+}
+
+void add_session_or_scene_argument(CLI::App& command, std::string& given) {
+  command.add_option("SESSION", given, "Name of the session (with --embedded: a scene file)")
       ->option_text(" ")
       ->required();
 }
@@ -84,6 +88,12 @@ std::string plan_text(const v1::Plan& plan) {
   for (const auto& pass : plan.passes()) facts.add("pass", pass);
   for (const auto& skipped : plan.skipped())
     facts.add("skipped", skipped.pass() + ": " + skipped.reason());
+  for (const auto& limit : plan.bending_limits()) {
+    facts.add("bending",
+              fmt::format("{}: true above a curvature of {} 1/m; finest useful spacing {} mm",
+                          limit.sheet(), number_text(limit.least_curvature_per_m()),
+                          number_text(limit.finest_spacing_m() * 1e3)));
+  }
   for (const auto& warning : plan.warnings()) {
     const std::string place = warning.field().empty() ? "" : " at " + warning.field();
     facts.add("warning", fmt::format("{}{}: {}", warning.code(), place, warning.message()));

@@ -28,6 +28,7 @@ CLI::App* add_group(CLI::App& app, const char* name, const char* description);
 
 // The positional SESSION.
 void add_session_argument(CLI::App& command, std::string& session);
+void add_session_or_scene_argument(CLI::App& command, std::string& given);
 
 // "paused"
 std::string state_text(v1::SessionState state);

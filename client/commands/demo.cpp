@@ -70,10 +70,10 @@ void perform(Connection& connection, Run& run, const std::function<void(const Ta
   RecordingOrder order;
   order.session = connection.call(&Sessions::CreateSession, request).name();
   order.path = run.path + ".weft";
+  order.replace = true;
   order.to = run.last_frame;
   order.until_rest = true;
   order.run = true;
-  for (const char* suffix : {"", "-journal"}) std::filesystem::remove(order.path + suffix);
   const RecordingResult result = record(connection, order, progress);
   if (!result.complete) throw interrupted();
   run.tally = result.tally;

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <filesystem>
-
 #include "client/commands/commands.h"
 #include "client/output/pace.h"
 #include "client/output/status.h"
@@ -13,7 +11,6 @@ namespace {
 
 struct Options {
   RecordingOrder order;
-  bool force = false;
   std::int64_t patience_s = 60;
 };
 
@@ -26,10 +23,6 @@ std::string progress_text(const RecordingOrder& order, const Tally& tally, doubl
     text = bar(done / static_cast<double>(*order.to - tally.first_frame)) + "  " + text;
   }
   return text;
-}
-
-void remove_old(const std::string& path) {
-  for (const char* suffix : {"", "-journal"}) std::filesystem::remove(path + suffix);
 }
 
 void answer(Context& context, const RecordingOrder& order, const RecordingResult& result) {
@@ -59,10 +52,9 @@ void answer(Context& context, const RecordingOrder& order, const RecordingResult
 
 void run(Context& context, const Options& options) {
   RecordingOrder order = options.order;
-  order.session = context.session_name(order.session);
+  order.session = context.session_or_scene(order.session);
   order.run = order.run || context.embedded;
   order.patience = std::chrono::seconds(options.patience_s);
-  if (options.force) remove_old(order.path);
 
   Pace pace;
   Status status(context.terminal.err, context.terminal.err_is_watched);
@@ -84,7 +76,7 @@ void add_record(CLI::App& app, Context& context) {
   RecordingOrder& order = options->order;
   CLI::App* command =
       app.add_subcommand("record", "Record the frames of a session to a file, losing none");
-  add_session_argument(*command, order.session);
+  add_session_or_scene_argument(*command, order.session);
   command->add_option("-o,--output", order.path, "Recording to write; it must not exist")
       ->type_name("FILE")
       ->required();
@@ -101,8 +93,9 @@ void add_record(CLI::App& app, Context& context) {
       ->add_option("--patience", options->patience_s,
                    "Seconds to try again after a connection broke")
       ->type_name("S")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  command->add_flag("--force", options->force, "Replace a file that exists");
+  command->add_flag("--force", order.replace, "Replace a file that exists");
   command->footer(
       "Without --to and --until-rest it ends when the session, having advanced, is paused.\n"
       "Ctrl-C ends it at any time; the file holds what came so far.");

@@ -33,27 +33,21 @@ v1::Progress wait_for_end(Context& context, const std::string& session) {
   throw interrupted();
 }
 
-v1::Session get_session(Context& context, const std::string& name) {
-  v1::GetSessionRequest request;
-  request.set_name(name);
-  return context.connection().call(&Sessions::GetSession, request);
-}
-
 void run(Context& context, const Options& options) {
   v1::RunSessionRequest request;
-  request.set_name(context.session_name(options.session));
+  request.set_name(context.session_or_scene(options.session));
   if (options.time_scale) request.set_time_scale(*options.time_scale);
   if (options.until_frame) request.set_until_frame(*options.until_frame);
   request.set_until_rest(options.until_rest);
   const auto response = context.connection().call(&Sessions::RunSession, request);
-  if (!options.wait) {
+  if (!options.wait && !context.embedded) {
     context.answer(to_json(response),
                    fmt::format("runs from frame {}\n", response.applied_frame()));
     return;
   }
 
   wait_for_end(context, request.name());
-  const v1::Session session = get_session(context, request.name());
+  const v1::Session session = context.connection().get_session(request.name());
   if (session.state() == v1::SESSION_STATE_FAILED) {
     throw Problem(Exit::kRefused, "FAILED_PRECONDITION", "SOLVER_FAILED", session.failure());
   }
@@ -70,7 +64,7 @@ void run(Context& context, const Options& options) {
 void add_run(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("run", "Let a session advance by itself");
-  add_session_argument(*command, options->session);
+  add_session_or_scene_argument(*command, options->session);
   command
       ->add_option("--time-scale", options->time_scale,
                    "Simulated seconds a second; else as fast as it goes")
@@ -78,7 +72,8 @@ void add_run(CLI::App& app, Context& context) {
   command->add_option("--until-frame", options->until_frame, "Pause after this frame")
       ->type_name("N");
   command->add_flag("--until-rest", options->until_rest, "Pause at rest");
-  command->add_flag("--wait", options->wait, "Wait until it is paused again");
+  command->add_flag("--wait", options->wait,
+                    "Wait until it is paused again (always with --embedded)");
   command->callback([&context, options] { run(context, *options); });
 }
 

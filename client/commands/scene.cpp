@@ -67,7 +67,8 @@ void add_new(CLI::App& scene, Context& context) {
   command->add_option("--rows", values.rows, "Particles along z")->type_name("N");
   command->add_option("--columns", values.columns, "Particles along x")->type_name("N");
   command->add_option("--spacing", values.spacing_m, "Distance between neighbours, m")
-      ->type_name("M");
+      ->type_name("M")
+      ->check(CLI::Range(1e-5, 10.0));
   command->add_option("--textile", values.textile, "Textile preset (weft textile list)")
       ->type_name("NAME");
   command->add_option("--bend", values.bend, "k_b in the paper's unit, 1e-4 N m^2 (paper-*)")
@@ -76,7 +77,8 @@ void add_new(CLI::App& scene, Context& context) {
       ->transform(CLI::CheckedTransformer(evaluators))
       ->option_text("series|exact|linearized|polynomial");
   command->add_option("--segments", values.segments, "Line segments of the linearized law")
-      ->type_name("N");
+      ->type_name("N")
+      ->check(CLI::Range(1, 65536));
   command->add_flag("--fold-clamp", values.fold_clamp, "Linearize the clamped function (eq. 5)");
   command->footer(template_list());
   command->callback([&context, options] { run_new(context, *options); });

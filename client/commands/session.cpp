@@ -36,9 +36,7 @@ void run_list(Context& context) {
 }
 
 void run_get(Context& context, const std::string& name) {
-  v1::GetSessionRequest request;
-  request.set_name(context.session_name(name));
-  const v1::Session session = context.connection().call(&Sessions::GetSession, request);
+  const v1::Session session = context.connection().get_session(context.session_name(name));
   context.answer(to_json(session), session_text(session) + plan_text(session.plan()));
 }
 

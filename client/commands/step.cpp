@@ -14,7 +14,7 @@ struct Options {
 
 void run(Context& context, const Options& options) {
   v1::StepSessionRequest request;
-  request.set_name(context.session_name(options.session));
+  request.set_name(context.session_or_scene(options.session));
   request.set_frames(options.frames);
   if (options.expected_frame) request.set_expected_frame(*options.expected_frame);
   const auto response = context.connection().call(&Sessions::StepSession, request);
@@ -29,7 +29,7 @@ void add_step(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("step", "Compute frames of a paused session and wait for them");
-  add_session_argument(*command, options->session);
+  add_session_or_scene_argument(*command, options->session);
   command->add_option("--frames", options->frames, "How many")
       ->type_name("N")
       ->capture_default_str();

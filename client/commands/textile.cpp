@@ -36,6 +36,12 @@ std::size_t place_in(std::vector<std::string>& list, const std::string& word) {
   return place;
 }
 
+// The value a sheet gets; the field's name has its unit. Empty where the field is not of the model.
+std::string si_text(const v1::MeasuredTextile& values, const std::string& field) {
+  const FieldDescriptor* found = values.GetDescriptor()->FindFieldByName(field);
+  return found == nullptr ? "" : number_text(values.GetReflection()->GetDouble(values, found));
+}
+
 void run_show(Context& context, const std::string& name) {
   v1::GetTextileRequest request;
   request.set_name(name.starts_with("textiles/") ? name : "textiles/" + name);
@@ -48,10 +54,11 @@ void run_show(Context& context, const std::string& name) {
   if (!textile.missing().empty())
     facts.add("missing", fmt::format("{}", fmt::join(textile.missing(), ", ")));
   if (!textile.note().empty()) facts.add("note", textile.note());
-  Table table({"FIELD", "VALUE", "UNIT", "STATUS", "SOURCE"});
+  Table table({"FIELD", "VALUE IN SI", "AS GIVEN", "UNIT", "STATUS", "SOURCE"});
   std::vector<std::string> sources;
   for (const auto& property : textile.properties()) {
-    table.add({property.field(), property.value(), property.unit(), property.status(),
+    table.add({property.field(), si_text(textile.values(), property.field()), property.value(),
+               property.unit(), property.status(),
                fmt::format("[{}]", place_in(sources, property.source()))});
   }
   std::string notes;
@@ -103,9 +110,7 @@ double read_number(const std::string& text, const std::string& setting) {
 
 v1::Textile textile_of(Context& context, const std::string& session,
                        const std::string& sheet_name) {
-  v1::GetSessionRequest request;
-  request.set_name(session);
-  const v1::Session answer = context.connection().call(&Sessions::GetSession, request);
+  const v1::Session answer = context.connection().get_session(session);
   for (const auto& sheet : answer.scene().sheets()) {
     if (sheet_name.empty() || sheet.name() == sheet_name) return sheet.textile();
   }
@@ -119,10 +124,11 @@ void run_set(Context& context, const SetOptions& options) {
   v1::UpdateTextileRequest request;
   request.set_name(context.session_name(options.session));
   request.set_sheet(options.sheet);
-  if (!options.preset.empty()) request.mutable_textile()->set_preset(options.preset);
-
-  const v1::Textile present =
-      options.values.empty() ? v1::Textile() : textile_of(context, request.name(), options.sheet);
+  const v1::Textile present = textile_of(context, request.name(), options.sheet);
+  if (!options.preset.empty()) {  // damping and friction are not the preset's
+    *request.mutable_textile() = present;
+    request.mutable_textile()->set_preset(options.preset);
+  }
   for (const auto& setting : options.values) {
     const std::size_t equals = setting.find('=');
     if (equals == std::string::npos)
@@ -159,7 +165,7 @@ void add_textile(CLI::App& app, Context& context) {
   command->add_option("--sheet", set->sheet, "Sheet to change; may be left out where there is one")
       ->type_name("NAME");
   CLI::Option* preset =
-      command->add_option("--preset", set->preset, "The whole textile from a preset")
+      command->add_option("--preset", set->preset, "Values of a preset; damping and friction stay")
           ->type_name("NAME");
   command->add_option("--set", set->values, "One value, such as bend_n_m2=2e-5; may be given again")
       ->option_text("FIELD=VALUE ...")

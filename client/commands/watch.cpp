@@ -133,7 +133,7 @@ bool watch(Context& context, const std::string& session, const Options& options,
 }
 
 void run(Context& context, const Options& options) {
-  const std::string session = context.session_name(options.session);
+  const std::string session = context.session_or_scene(options.session);
   bool to_be_run = options.run || context.embedded;
   View view(context);
   while (!watch(context, session, options, to_be_run, view)) {
@@ -149,7 +149,7 @@ void add_watch(CLI::App& app, Context& context) {
   auto options = std::make_shared<Options>();
   CLI::App* command =
       app.add_subcommand("watch", "Show a session's frames as they come, until Ctrl-C");
-  add_session_argument(*command, options->session);
+  add_session_or_scene_argument(*command, options->session);
   command->add_option("--to", options->to, "End after this frame")->type_name("N");
   command->add_flag("--until-rest", options->until_rest, "End at rest");
   command->add_flag("--run", options->run,

@@ -8,12 +8,6 @@ namespace {
 
 using Sessions = v1::SessionService::Stub;
 
-v1::Session get_session(Connection& connection, const std::string& name) {
-  v1::GetSessionRequest request;
-  request.set_name(name);
-  return connection.call(&Sessions::GetSession, request);
-}
-
 v1::StreamFramesRequest stream_request(const v1::Session& session, const RecordingOrder& order) {
   v1::StreamFramesRequest request;
   request.set_session(session.name());
@@ -46,7 +40,7 @@ bool has_ended(const v1::Progress& progress, const Tally& tally) {
 
 RecordingResult record(Connection& connection, const RecordingOrder& order,
                        const std::function<void(const Tally&)>& progress) {
-  const v1::Session session = get_session(connection, order.session);
+  const v1::Session session = connection.get_session(order.session);
   FrameFeed feed(connection, stream_request(session, order), order.patience);
   std::optional<RecordingWriter> writer;
   RecordingResult result;
@@ -56,7 +50,7 @@ RecordingResult record(Connection& connection, const RecordingOrder& order,
     if (!message) break;
     switch (message->message_case()) {
       case v1::StreamFramesResponse::kHeader:
-        writer.emplace(order.path, session.scene(), message->header());
+        writer.emplace(order.path, order.replace, session.scene(), message->header());
         if (order.run) let_run(connection, order);
         break;
       case v1::StreamFramesResponse::kFrame:

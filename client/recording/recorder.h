@@ -16,6 +16,7 @@ namespace weft::client {
 struct RecordingOrder {
   std::string session;  // "sessions/flag"
   std::string path;
+  bool replace = false;              // a file of that path
   std::optional<std::int64_t> from;  // absent: the newest frame
   std::optional<std::int64_t> to;
   bool until_rest = false;

@@ -15,8 +15,9 @@ namespace {
 constexpr std::chrono::milliseconds kCommitInterval{500};
 constexpr std::size_t kCommitBytes = 32 << 20;
 
-Database create(const std::string& path) {
-  if (std::filesystem::exists(path)) throw unwritable(path, "the file exists");
+Database create(const std::string& path, bool replace) {
+  if (!replace && std::filesystem::exists(path)) throw unwritable(path, "the file exists");
+  for (const char* suffix : {"", "-journal"}) std::filesystem::remove(path + suffix);
   Database database(path, Database::Access::kCreate);
   // a rollback journal, and no page written before its commit: the file alone is a whole recording
   database.execute(
@@ -44,10 +45,10 @@ void describe(Database& database, const v1::Scene& scene, const v1::StreamHeader
 
 }  // namespace
 
-RecordingWriter::RecordingWriter(const std::string& path, const v1::Scene& scene,
+RecordingWriter::RecordingWriter(const std::string& path, bool replace, const v1::Scene& scene,
                                  const v1::StreamHeader& header)
     : uid_(header.uid()),
-      database_(create(path)),
+      database_(create(path, replace)),
       insert_((describe(database_, scene, header),
                database_.prepare("INSERT INTO frames VALUES (?, ?, ?, ?)"))),
       last_commit_(Clock::now()) {}

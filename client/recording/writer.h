@@ -12,8 +12,9 @@ namespace weft::client {
 // Writes a recording. What is committed stays readable, whatever becomes of this process.
 class RecordingWriter {
  public:
-  // The file must not exist.
-  RecordingWriter(const std::string& path, const v1::Scene& scene, const v1::StreamHeader& header);
+  // Throws where the file exists, unless it is to be replaced.
+  RecordingWriter(const std::string& path, bool replace, const v1::Scene& scene,
+                  const v1::StreamHeader& header);
   // Commits what it can.
   ~RecordingWriter();
   RecordingWriter(const RecordingWriter&) = delete;

@@ -168,6 +168,21 @@ TEST_F(CommandsTest, EveryAnswerIsOneJsonDocumentWhenAskedFor) {
   }
 }
 
+TEST_F(CommandsTest, AFieldThatScenesLackIsNamedWithItsLine) {
+  const std::string file = path("scene.json");
+  write_file(file, "{\n  \"sheetz\": []\n}");
+  EXPECT_THAT(weft({"scene", "check", file}).err,
+              HasSubstr("scene.json, line 2: no such field: sheetz"));
+}
+
+TEST_F(CommandsTest, ASceneThatNoRequestCanHoldIsRefusedWithItsSize) {
+  v1::Scene scene = small_scene();
+  scene.mutable_sheets(0)->set_name(std::string(17 << 20, 'x'));
+  const Outcome refused = weft({"scene", "check", scene_file(scene), "--json"});
+  EXPECT_EQ(refused.exit, 1);
+  EXPECT_EQ(nlohmann::json::parse(refused.err)["error"]["reason"], "REQUEST_TOO_LARGE");
+}
+
 TEST_F(CommandsTest, ATextileValueIsChangedWhileTheSessionRuns) {
   service_.create(small_scene(), "cloth");
   ask({"run", "cloth"});
@@ -181,6 +196,7 @@ TEST_F(CommandsTest, ATextileValueIsChangedWhileTheSessionRuns) {
 
   const auto preset = ask({"textile", "set", "cloth", "--preset", "denim_11oz"});
   EXPECT_GT(preset["textile"]["measured"]["areal_density_kg_per_m2"], 0);
+  EXPECT_EQ(preset["textile"]["damping_kg_per_s"], 0.001) << "is not the preset's";
 }
 
 TEST_F(CommandsTest, ABadTextileValueIsNamed) {
@@ -240,6 +256,9 @@ TEST_F(CommandsTest, EmbeddedNeedsNoServer) {
       run_weft({"record", scene, "--to", "30", "-o", recording, "--embedded", "--json"});
   EXPECT_EQ(recorded.exit, 0) << recorded.err;
   EXPECT_EQ(recorded.json()["frames"], 31);
+  const Outcome ran = run_weft({"run", scene, "--until-frame", "5", "--embedded", "--json"});
+  EXPECT_EQ(ran.json()["frame"], 5) << "it waits, or the session would be lost";
+  EXPECT_EQ(run_weft({"pause", scene, "--embedded"}).exit, 2);
 }
 
 TEST_F(CommandsTest, AStopEndsAWaitingCommand) {

@@ -216,7 +216,8 @@ TEST_F(RecordingTest, NeverReplacesAFileUnasked) {
   const Outcome refused = weft({"record", "cloth", "--to", "0", "-o", file_});
   EXPECT_EQ(refused.exit, 4);
   EXPECT_THAT(refused.err, AllOf(HasSubstr(file_), HasSubstr("exists")));
-  EXPECT_EQ(read_file(file_), "precious");
+  EXPECT_EQ(weft({"record", "nosuch", "--to", "0", "-o", file_, "--force"}).exit, 1);
+  EXPECT_EQ(read_file(file_), "precious") << "nothing came to replace it";
   EXPECT_EQ(weft({"record", "cloth", "--to", "0", "-o", file_, "--force"}).exit, 0);
   EXPECT_EQ(recorded(file_).size(), 1);
 }

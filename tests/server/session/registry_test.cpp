@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "tests/server/session/session_bench.h"
+#include "tests/server/session/session_support.h"
 
 namespace weft::testing {
 namespace {

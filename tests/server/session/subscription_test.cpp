@@ -4,7 +4,7 @@
 
 #include <thread>
 
-#include "tests/server/session/session_bench.h"
+#include "tests/server/session/session_support.h"
 
 namespace weft::testing {
 namespace {

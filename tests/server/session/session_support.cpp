@@ -1,4 +1,4 @@
-#include "tests/server/session/session_bench.h"
+#include "tests/server/session/session_support.h"
 
 #include <gtest/gtest.h>
 

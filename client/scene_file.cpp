@@ -8,7 +8,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <regex>
 #include <sstream>
 #include <tuple>
 
@@ -66,16 +65,14 @@ v1::Scene read_scene(const std::string& path) {
   if (status.ok()) return scene;
 
   // protobuf says "(sheets[0].grid) rowz: Cannot find field."
+  constexpr std::string_view kUnknown = ": Cannot find field.";
   const std::string message(status.message());
-  static const std::regex kPlaced(R"(^(?:\(([^)]*)\):? )?(\w+): Cannot find field\.$)");
-  std::smatch match;
-  if (std::regex_match(message, match, kPlaced)) {
-    const std::string parent = match[1];
-    throw malformed(
-        path + line_of(match[2], text),
-        fmt::format("no such field: {}{}{}", parent, parent.empty() ? "" : ".", match[2].str()));
-  }
-  throw malformed(path, message);
+  if (!message.ends_with(kUnknown)) throw malformed(path, message);
+  std::string place = message.substr(0, message.size() - kUnknown.size());
+  const std::string word = place.substr(place.rfind(' ') + 1);
+  if (place.starts_with('('))
+    place = fmt::format("{}.{}", place.substr(1, place.find(')') - 1), word);
+  throw malformed(path + line_of(word, text), "no such field: " + place);
 }
 
 v1::Session create_session(Connection& connection, const std::string& path,

@@ -7,6 +7,7 @@
 #include <optional>
 #include <sstream>
 
+#include "core/motion/sheet_solver.h"
 #include "core/motion/stability.h"
 
 namespace weft {
@@ -59,6 +60,17 @@ StepPlan plan_step(const Scene& scene, const std::vector<SheetShape>& shapes) {
   step.substeps = static_cast<std::int64_t>(std::clamp(count, 1.0, 1e18));
   step.substep = solver.frame_step / static_cast<double>(step.substeps);
   return step;
+}
+
+void describe_solver(const Scene& scene, const SheetDefinition& sheet, Plan& plan) {
+  const std::string_view reason = needs_plain_solver(scene, sheet);
+  if (!reason.empty()) {
+    plan.skipped.push_back({join(sheet.name, ": vector kernels"), std::string(reason)});
+    return;
+  }
+  const bool single = scene.solver.precision == Precision::kSingle;
+  plan.passes.push_back(
+      join(sheet.name, ": vector kernels in ", single ? "single" : "double", " precision"));
 }
 
 void describe_families(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan) {
@@ -214,8 +226,10 @@ void warn(const Scene& scene, const std::vector<SheetShape>& shapes, Plan& plan)
 Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes) {
   Plan plan;
   plan.step = plan_step(scene, shapes);
-  for (std::size_t s = 0; s < shapes.size(); ++s)
+  for (std::size_t s = 0; s < shapes.size(); ++s) {
+    describe_solver(scene, scene.sheets[s], plan);
     describe_families(scene.sheets[s], shapes[s].mesh, plan);
+  }
   const auto pass = [&](const char* name, bool runs, const char* why_not) {
     if (runs)
       plan.passes.emplace_back(name);

@@ -7,7 +7,7 @@
 #include "core/contact/contact.h"
 #include "core/forces/air.h"
 #include "core/forces/springs.h"
-#include "core/motion/integrator.h"
+#include "core/motion/sheet_solver.h"
 
 namespace weft {
 namespace {
@@ -15,10 +15,11 @@ namespace {
 // A sheet in motion.
 struct Sheet {
   Mesh mesh;
-  Motion motion;
-  Dynamics dynamics;
-  Matrix3Xd start;  // positions that paths are relative to, m
-  double skin = 0;  // m
+  Dynamics dynamics;  // the forces in double
+  std::unique_ptr<SheetSolver> solver;
+  Matrix3Xd start;       // positions that paths are relative to, m
+  Matrix3Xd velocities;  // of the frame before, m/s; empty at first
+  double skin = 0;       // m
 };
 
 // Held particles go where their paths lead.
@@ -28,8 +29,7 @@ void lead_pins(const SheetDefinition& definition, double time, double dt, Sheet&
     const Vector3d offset = offset_at(pin.path, time);
     const Vector3d displacement = offset - offset_at(pin.path, time - dt);
     for (const int i : pin.particles) {
-      sheet.motion.x.col(i) = sheet.start.col(i) + offset;
-      sheet.motion.d.col(i) = displacement;
+      sheet.solver->lead(i, sheet.start.col(i) + offset, displacement);
     }
   }
 }
@@ -42,6 +42,13 @@ void set_textile_of(const Scene& scene, const SheetDefinition& definition, Sheet
   sheet.dynamics.drag = sheet.mesh.drag.maxCoeff() > 0 ? sheet.mesh.drag : VectorXd();
   sheet.dynamics.gravity = scene.environment.gravity;
   sheet.skin = definition.skin.value_or(definition.grid.spacing / 10);
+}
+
+std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefinition& definition,
+                                         const Dynamics& dynamics) {
+  if (!needs_plain_solver(scene, definition).empty())
+    return make_plain_solver(dynamics, scene.solver.integrator);
+  return make_lattice_solver(definition, dynamics, scene.solver);
 }
 
 // When the last path ends, s.
@@ -62,7 +69,6 @@ struct Simulation::State {
   Scene scene;
   Plan plan;
   std::vector<Sheet> sheets;
-  std::unique_ptr<Integrator> integrator;
   std::int64_t frame = 0;
   int frames_at_rest = 0;
   double rest_after = 0;  // s
@@ -70,8 +76,8 @@ struct Simulation::State {
   explicit State(Scene given);
   void bind_forces();
   void step(double time, double dt);
-  bool quiet() const;
-  Plan plan_now() const;
+  bool quiet();
+  Plan plan_for(const std::vector<Matrix3Xd>& x) const;
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
 };
 
@@ -81,15 +87,14 @@ void Simulation::State::step(double time, double dt) {
     Sheet& sheet = sheets[s];
     const SheetDefinition& definition = scene.sheets[s];
 
-    // motion: springs and air give forces (bind_forces), the integrator asks for them where it
-    // needs them
-    integrator->advance(sheet.dynamics, time, dt, sheet.motion);
+    // forces and motion
+    sheet.solver->advance(time);
     lead_pins(definition, time + dt, dt, sheet);
 
     // contact last, so that no particle ends a step inside a collider
     if (!scene.colliders.empty())
-      resolve_contacts(scene.colliders, definition.textile.friction, sheet.skin, time + dt, dt,
-                       sheet.dynamics.inverse_mass, sheet.motion.x, sheet.motion.d);
+      sheet.solver->resolve(
+          Contacts(scene.colliders, definition.textile.friction, sheet.skin, time + dt, dt));
   }
 }
 
@@ -111,19 +116,17 @@ void Simulation::State::bind_forces() {
 }
 
 Simulation::State::State(Scene given)
-    : scene(std::move(given)),
-      sheets(scene.sheets.size()),
-      integrator(make_integrator(scene.solver.integrator)),
-      rest_after(end_of_paths(scene)) {
+    : scene(std::move(given)), sheets(scene.sheets.size()), rest_after(end_of_paths(scene)) {
+  std::vector<Matrix3Xd> x(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const SheetDefinition& definition = scene.sheets[s];
     set_textile_of(scene, definition, sheets[s]);
-    sheets[s].start = sheets[s].motion.x = start_positions(definition);
+    sheets[s].start = x[s] = start_positions(definition);
     for (const Pin& pin : definition.pins)
-      for (const int i : pin.particles) sheets[s].motion.x.col(i) += offset_at(pin.path, 0);
+      for (const int i : pin.particles) x[s].col(i) += offset_at(pin.path, 0);
   }
   bind_forces();
-  plan = plan_now();
+  plan = plan_for(x);
 
   const double dt = plan.step.substep;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
@@ -132,42 +135,45 @@ Simulation::State::State(Scene given)
     for (const Pin& pin : definition.pins)
       for (const int i : pin.particles)
         v.col(i) = (offset_at(pin.path, dt) - offset_at(pin.path, 0)) / dt;
-    integrator->start(sheets[s].dynamics, 0, dt, v, sheets[s].motion);
+    sheets[s].solver = make_solver(scene, definition, sheets[s].dynamics);
+    sheets[s].solver->start(x[s], v, 0, dt);
   }
 }
 
-Plan Simulation::State::plan_now() const {
+// x: positions of each sheet.
+Plan Simulation::State::plan_for(const std::vector<Matrix3Xd>& x) const {
   std::vector<SheetShape> shapes;
   shapes.reserve(sheets.size());
-  for (const Sheet& sheet : sheets)
-    shapes.push_back({sheet.mesh, sheet.dynamics.inverse_mass, sheet.motion.x});
+  for (std::size_t s = 0; s < sheets.size(); ++s)
+    shapes.push_back({sheets[s].mesh, sheets[s].dynamics.inverse_mass, x[s]});
   return make_plan(scene, shapes);
 }
 
-// Whether kinetic energy and net forces are small; the net force is m (d - d_previous) / dt^2,
-// contact included.
-bool Simulation::State::quiet() const {
-  if (time() < rest_after) return false;
+// Whether in the last frame kinetic energy and mean net forces, contact included, were small. Net
+// forces of one step would be as rough as positions are rounded.
+bool Simulation::State::quiet() {
   constexpr double kEnergyShare = 1e-6, kForceShare = 0.01;
-  const double dt = plan.step.substep;
   const double given = scene.environment.gravity.norm();
   const double gravity = given > 0 ? given : kStandardGravity;
+  bool quiet = time() >= rest_after;
   Matrix3Xd v;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
-    const Sheet& sheet = sheets[s];
+    Sheet& sheet = sheets[s];
     const Grid& grid = scene.sheets[s].grid;
     const double height = (std::max(grid.rows, grid.columns) - 1) * grid.spacing;
-    integrator->velocity(sheet.motion, dt, v);
+    sheet.solver->velocities(v);
+    const double most_change = kForceShare * gravity * scene.solver.frame_step;
+    quiet = quiet && sheet.velocities.size() > 0;
     double energy = 0;
-    for (Eigen::Index i = 0; i < v.cols(); ++i) {
+    for (Eigen::Index i = 0; quiet && i < v.cols(); ++i) {
       if (sheet.dynamics.inverse_mass[i] == 0) continue;
       energy += sheet.mesh.mass[i] / 2 * v.col(i).squaredNorm();
-      const double a = (sheet.motion.d.col(i) - sheet.motion.d_previous.col(i)).norm() / (dt * dt);
-      if (a > kForceShare * gravity) return false;
+      quiet = (v.col(i) - sheet.velocities.col(i)).norm() <= most_change;
     }
-    if (energy > kEnergyShare * sheet.mesh.mass.sum() * gravity * height) return false;
+    quiet = quiet && energy <= kEnergyShare * sheet.mesh.mass.sum() * gravity * height;
+    sheet.velocities.swap(v);
   }
-  return true;
+  return quiet;
 }
 
 Simulation::Simulation(Scene scene) : state_(std::make_unique<State>(std::move(scene))) {}
@@ -203,7 +209,7 @@ bool Simulation::advance_frame() {
   for (std::int64_t k = 0; k < step.substeps; ++k)
     state.step(begin + static_cast<double>(k) * step.substep, step.substep);
   for (const Sheet& sheet : state.sheets)
-    if (!sheet.motion.x.allFinite() || !sheet.motion.d.allFinite()) return false;
+    if (!sheet.solver->finite()) return false;
   ++state.frame;
   state.frames_at_rest = state.quiet() ? state.frames_at_rest + 1 : 0;
   return true;
@@ -233,9 +239,11 @@ void copy_planes(const Matrix3Xd& from, Eigen::Index first, std::span<double> ou
 
 void Simulation::copy_positions(std::span<double> out) const {
   Eigen::Index first = 0;
+  Matrix3Xd x;
   for (const Sheet& sheet : state_->sheets) {
-    copy_planes(sheet.motion.x, first, out);
-    first += sheet.motion.x.cols();
+    sheet.solver->positions(x);
+    copy_planes(x, first, out);
+    first += x.cols();
   }
 }
 
@@ -243,7 +251,7 @@ void Simulation::copy_velocities(std::span<double> out) const {
   Eigen::Index first = 0;
   Matrix3Xd v;
   for (const Sheet& sheet : state_->sheets) {
-    state_->integrator->velocity(sheet.motion, state_->plan.step.substep, v);
+    sheet.solver->velocities(v);
     copy_planes(v, first, out);
     first += v.cols();
   }
@@ -251,10 +259,10 @@ void Simulation::copy_velocities(std::span<double> out) const {
 
 FrameStats Simulation::stats() const {
   FrameStats stats;
-  Matrix3Xd v;
+  Matrix3Xd x, v;
   for (const Sheet& sheet : state_->sheets) {
-    const Matrix3Xd& x = sheet.motion.x;
-    state_->integrator->velocity(sheet.motion, state_->plan.step.substep, v);
+    sheet.solver->positions(x);
+    sheet.solver->velocities(v);
     stats.kinetic_energy += sheet.mesh.mass.dot(v.colwise().squaredNorm().transpose()) / 2;
     stats.potential_energy += spring_energy(sheet.mesh, x) + isometric_energy(sheet.mesh, x) -
                               sheet.mesh.mass.dot(x.transpose() * sheet.dynamics.gravity);
@@ -269,14 +277,15 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
   if (definition.textile == textile) return std::nullopt;
 
   const double dt = state.plan.step.substep;
-  std::vector<Matrix3Xd> velocities(state.sheets.size());
-  for (std::size_t s = 0; s < state.sheets.size(); ++s)
-    state.integrator->closing_velocity(state.sheets[s].dynamics, state.time(), dt,
-                                       state.sheets[s].motion, velocities[s]);
+  std::vector<Matrix3Xd> x(state.sheets.size()), v(state.sheets.size());
+  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
+    state.sheets[s].solver->positions(x[s]);
+    state.sheets[s].solver->closing_velocities(state.time(), v[s]);
+  }
 
   const Textile old_textile = std::exchange(definition.textile, textile);
   set_textile_of(state.scene, definition, state.sheets[index]);
-  Plan plan = state.plan_now();
+  Plan plan = state.plan_for(x);
   if (const auto refused = refusal_of(plan.step, state.scene.solver.allow_unstable)) {
     definition.textile = old_textile;
     set_textile_of(state.scene, definition, state.sheets[index]);
@@ -286,10 +295,11 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
 
   // sheets whose forces and step stay go on as they were
   const double new_dt = state.plan.step.substep;
-  for (std::size_t s = 0; s < state.sheets.size(); ++s)
-    if (s == index || new_dt != dt)
-      state.integrator->start(state.sheets[s].dynamics, state.time(), new_dt, velocities[s],
-                              state.sheets[s].motion);
+  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
+    Sheet& sheet = state.sheets[s];
+    if (s == index) sheet.solver = make_solver(state.scene, definition, sheet.dynamics);
+    if (s == index || new_dt != dt) sheet.solver->start(x[s], v[s], state.time(), new_dt);
+  }
   state.frames_at_rest = 0;
   return std::nullopt;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace weft {
 namespace {
@@ -17,14 +18,6 @@ Distance distance_at(const Collider& collider, const Vector3d& offset, const Vec
   return std::visit([&](const auto& shape) { return distance(shape, point - offset); },
                     collider.shape);
 }
-
-// A collider during one step.
-struct Placed {
-  const Collider& collider;
-  Vector3d offset;   // from its start, m
-  Vector3d carried;  // its displacement in the step, m
-  double friction;   // between it and the textile
-};
 
 }  // namespace
 
@@ -62,47 +55,56 @@ Distance distance(const Collider& collider, const Vector3d& point, double time) 
   return distance_at(collider, offset_at(collider.path, time), point);
 }
 
-void resolve_contacts(std::span<const Collider> colliders, double friction, double skin,
-                      double time, double dt, const VectorXd& inverse_mass, Matrix3Xd& x,
-                      Matrix3Xd& d) {
-  std::vector<Placed> placed;
-  placed.reserve(colliders.size());
+Contacts::Contacts(std::span<const Collider> colliders, double friction, double skin, double time,
+                   double dt)
+    : skin_(skin) {
+  placed_.reserve(colliders.size());
   for (const Collider& collider : colliders) {
     const Vector3d offset = offset_at(collider.path, time);
-    placed.push_back({collider, offset, offset - offset_at(collider.path, time - dt),
-                      std::sqrt(friction * collider.friction)});
+    const Vector3d carried = offset - offset_at(collider.path, time - dt);
+    placed_.push_back({collider, offset, carried, std::sqrt(friction * collider.friction)});
+    reach_ = std::max(reach_, carried.norm());
   }
+}
 
+double Contacts::gap(const Vector3d& point) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Placed& placed : placed_)
+    nearest = std::min(nearest, distance_at(placed.collider, placed.offset, point).value);
+  return nearest - skin_;
+}
+
+bool Contacts::resolve(Vector3d& x, Vector3d& d) const {
   // a body may push a particle into another one: rounds go on until one moves it no further
   constexpr int kRounds = 32;
   constexpr double kNothing = 1e-12;  // m
-  for (Eigen::Index i = 0; i < x.cols(); ++i) {
-    if (inverse_mass[i] == 0) continue;
-    for (int round = 0; round < kRounds; ++round) {
-      double deepest = 0;
-      for (const auto& [collider, offset, carried, mu] : placed) {
-        const auto [value, normal] = distance_at(collider, offset, x.col(i));
-        if (!(value < skin)) continue;
-        const double depth = skin - value;
-        deepest = std::max(deepest, depth);
-        const Vector3d relative = d.col(i) - carried;
-        const double approach = relative.dot(normal);
+  bool touched = false;
+  for (int round = 0; round < kRounds; ++round) {
+    double deepest = 0;
+    for (const auto& [collider, offset, carried, mu] : placed_) {
+      const auto [value, normal] = distance_at(collider, offset, x);
+      if (!(value < skin_)) continue;
+      touched = true;
+      const double depth = skin_ - value;
+      deepest = std::max(deepest, depth);
+      const Vector3d relative = d - carried;
+      const double approach = relative.dot(normal);
 
-        // out to the skin; the push takes away approach but never adds speed
-        x.col(i) += depth * normal;
-        d.col(i) += std::clamp(-approach, 0.0, depth) * normal;
+      // out to the skin; the push takes away approach but never adds speed
+      x += depth * normal;
+      d += std::clamp(-approach, 0.0, depth) * normal;
 
-        // Coulomb: the push bounds how much sliding it can stop
-        const Vector3d sliding = relative - approach * normal;
-        const double length = sliding.norm();
-        if (length == 0) continue;
-        const Vector3d stopped = std::min(1.0, mu * depth / length) * sliding;
-        x.col(i) -= stopped;
-        d.col(i) -= stopped;
-      }
-      if (deepest <= kNothing || placed.size() == 1) break;
+      // Coulomb: the push bounds how much sliding it can stop
+      const Vector3d sliding = relative - approach * normal;
+      const double length = sliding.norm();
+      if (length == 0) continue;
+      const Vector3d stopped = std::min(1.0, mu * depth / length) * sliding;
+      x -= stopped;
+      d -= stopped;
     }
+    if (deepest <= kNothing || placed_.size() == 1) break;
   }
+  return touched;
 }
 
 }  // namespace weft

@@ -1,8 +1,9 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
-#include "core/model/mesh.h"
+#include "core/model/scene.h"
 
 namespace weft {
 
@@ -19,12 +20,31 @@ Distance distance(const Box& box, const Vector3d& point);
 Distance distance(const Capsule& capsule, const Vector3d& point);
 Distance distance(const Collider& collider, const Vector3d& point, double time);
 
-// Puts every free particle that came closer than `skin` (m) to a collider back to the skin, takes
-// away its approach (inelastic), and slows its sliding by Coulomb's law. time: s, at the end of the
-// step dt; friction: of the textile; inverse_mass: (n) 0 for held particles; x: positions, m; d:
-// displacements of the step, m (3 x n).
-void resolve_contacts(std::span<const Collider> colliders, double friction, double skin,
-                      double time, double dt, const VectorXd& inverse_mass, Matrix3Xd& x,
-                      Matrix3Xd& d);
+// The colliders of a scene during one step, as a sheet meets them.
+class Contacts {
+ public:
+  // friction: of the textile; skin: m; from `time` - dt to `time`, s.
+  Contacts(std::span<const Collider> colliders, double friction, double skin, double time,
+           double dt);
+
+  // How far a point is from the nearest skin, negative within it, m.
+  double gap(const Vector3d& point) const;
+  // How far the fastest collider moves in this step, m.
+  double reach() const { return reach_; }
+  // Moves a particle that is closer to a collider than the skin out to it, inelastically, and slows
+  // its sliding by Coulomb friction. x: position, d: displacement of the last step, m. Whether it
+  // touched one.
+  bool resolve(Vector3d& x, Vector3d& d) const;
+
+ private:
+  struct Placed {
+    const Collider& collider;
+    Vector3d offset;   // from its start, m
+    Vector3d carried;  // its displacement in the step, m
+    double friction;   // between it and the textile
+  };
+  std::vector<Placed> placed_;
+  double skin_, reach_ = 0;
+};
 
 }  // namespace weft

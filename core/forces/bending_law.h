@@ -37,10 +37,13 @@ class LinearizedBending {
   double value(double r) const;
   double integral(double r) const;
 
- private:
+  // g(r) = intercept + slope r, for r from segment / segments.
   struct Segment {
     double intercept, slope, integral;  // integral of g from 1 to the segment's upper end
   };
+  const std::vector<Segment>& segments() const { return segments_; }
+
+ private:
   int index(double r) const;
   std::vector<Segment> segments_;
 };
@@ -52,9 +55,12 @@ class PolynomialBending {
   double value(double r) const;
   double integral(double r) const;
 
+  // Of powers of t = 2 r - 1, highest first.
+  const std::vector<double>& coefficients() const { return coefficients_; }
+
  private:
   double primitive(double t) const;
-  std::vector<double> coefficients_;  // of powers of t = 2 r - 1, highest first
+  std::vector<double> coefficients_;
 };
 
 using BendingFunction =
@@ -74,6 +80,9 @@ class BendingForce {
     return scale_ * g.value(r);
   }
   const BendingFunction& function() const { return function_; }
+  double scale() const { return scale_; }              // k_b / L^2, N
+  double clamp() const { return clamp_; }              // c_b, N/m
+  double rest_length() const { return rest_length_; }  // L, m
 
   double energy(double length) const;  // J
   double slope(double length) const;   // d force / d length, N/m

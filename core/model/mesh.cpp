@@ -23,16 +23,7 @@ std::vector<Connection> connections(const Grid& grid, int rows, int columns,
   return out;
 }
 
-// Constants of a textile on a mesh. Along an edge, half of the sheet is missing: edge_share.
-struct Constants {
-  double edge_share;
-  double stretch_warp, stretch_weft, shear;       // N/m
-  double bend_warp, bend_weft, bend_diagonal;     // k_b, N m^2
-  double clamp_warp, clamp_weft, clamp_diagonal;  // c_b, N/m
-  double rigidity_warp, rigidity_weft;            // B, N m
-};
-
-Constants constants(const RawTextile& raw, double h, bool) {
+LatticeConstants constants(const RawTextile& raw, double h, bool) {
   const double clamp = raw.clamp.value_or(raw.stretch);
   const double rigidity = 1.5 * raw.bend / h;  // k_b = 2/3 B h, solved for B
   return {1.0,      raw.stretch, raw.stretch, raw.shear, raw.bend, raw.bend,
@@ -41,7 +32,7 @@ Constants constants(const RawTextile& raw, double h, bool) {
 
 // An interlaced connection of strip width h bends like a beam of rigidity B h when k_b = 2/3 B h;
 // diagonals carry 2/9 of the mean rigidity along each axis.
-Constants constants(const MeasuredTextile& textile, double h, bool diagonal_bend) {
+LatticeConstants constants(const MeasuredTextile& textile, double h, bool diagonal_bend) {
   const double warp = textile.bend_rigidity_warp, weft = textile.bend_rigidity_weft;
   const double carried = diagonal_bend ? 2.0 / 9 * (warp + weft) / 2 : 0;
   return {0.5,
@@ -86,34 +77,44 @@ void add_bend(Mesh& mesh, const Grid& grid, const ChoiKo& law, int rows, int col
 
 // Bergou et al. 2006 on a lattice: B / 2 |x_(i-1) - 2 x_i + x_(i+1)|^2 w / h^3 along each axis, w
 // the width of the strip, and B_t |x_00 - x_01 - x_10 + x_11|^2 / h^2 for the twist of a cell.
-void add_stencils(Mesh& mesh, const Grid& grid, const Constants& k) {
-  const double h = grid.spacing;
-  const auto add_axis = [&](int rows, int columns, double rigidity) {
+void add_stencils(Mesh& mesh, const Grid& grid, const LatticeConstants& k) {
+  const IsometricStiffness stiffness = isometric_stiffness(k, grid.spacing);
+  const auto add_axis = [&](int rows, int columns, double inside) {
     for (const Part part : {Part::kInside, Part::kEdge}) {
-      const double width = part == Part::kEdge ? h * k.edge_share : h;
+      const double share = part == Part::kEdge ? k.edge_share : 1;
       for (const auto& [i, j] : connections(grid, rows, columns, part))
-        mesh.stencils.push_back(
-            {{i, (i + j) / 2, j, j}, {1, -2, 1, 0}, rigidity * width / (h * h * h)});
+        mesh.stencils.push_back({{i, (i + j) / 2, j, j}, {1, -2, 1, 0}, inside * share});
     }
   };
-  add_axis(0, 2, k.rigidity_warp);
-  add_axis(2, 0, k.rigidity_weft);
-  const double twist = k.rigidity_warp + k.rigidity_weft;  // 2 B_t
+  add_axis(0, 2, stiffness.warp);
+  add_axis(2, 0, stiffness.weft);
   for (const auto& [i, j] : connections(grid, 1, 1))
-    mesh.stencils.push_back({{i, i + 1, j - 1, j}, {1, -1, -1, 1}, twist / (h * h)});
+    mesh.stencils.push_back({{i, i + 1, j - 1, j}, {1, -1, -1, 1}, stiffness.twist});
   std::erase_if(mesh.stencils, [](const Stencil& stencil) { return stencil.stiffness == 0; });
 }
 
 }  // namespace
+
+LatticeConstants lattice_constants(const SheetDefinition& sheet) {
+  const ChoiKo* law = std::get_if<ChoiKo>(&sheet.bending);
+  const bool diagonal_bend = law != nullptr && law->diagonal_bend;
+  return std::visit(
+      [&](const auto& textile) { return constants(textile, sheet.grid.spacing, diagonal_bend); },
+      sheet.textile.model);
+}
+
+IsometricStiffness isometric_stiffness(const LatticeConstants& k, double h) {
+  // width of a strip h; 2 B_t is the sum of both rigidities
+  return {k.rigidity_warp / (h * h), k.rigidity_weft / (h * h),
+          (k.rigidity_warp + k.rigidity_weft) / (h * h)};
+}
 
 Mesh make_lattice(const SheetDefinition& sheet) {
   const Grid& grid = sheet.grid;
   const double h = grid.spacing;
   const ChoiKo* choi_ko = std::get_if<ChoiKo>(&sheet.bending);
   const bool diagonal_bend = choi_ko != nullptr && choi_ko->diagonal_bend;
-  const Constants k =
-      std::visit([&](const auto& textile) { return constants(textile, h, diagonal_bend); },
-                 sheet.textile.model);
+  const LatticeConstants k = lattice_constants(sheet);
 
   Mesh mesh;
   mesh.damping = sheet.textile.damping;

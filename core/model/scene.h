@@ -108,8 +108,14 @@ struct Environment {
 
 enum class IntegratorKind { kVerlet, kEuler, kMidpoint, kRk4 };
 
+// Of positions and forces while stepping.
+enum class Precision { kSingle, kDouble };
+
 struct SolverSettings {
   IntegratorKind integrator = IntegratorKind::kVerlet;
+  Precision precision = Precision::kSingle;
+  bool compensated = true;        // kSingle adds up what its sums of positions lose
+  bool plain = false;             // one connection after the other, in double: to compare with
   double frame_step = 1.0 / 60;   // s
   std::optional<double> substep;  // asked for, s
   bool allow_unstable = false;

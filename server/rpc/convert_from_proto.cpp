@@ -20,6 +20,7 @@ constexpr std::array kEvaluators = {Evaluator::kLinearized, Evaluator::kSeries, 
 constexpr std::array kIntegrators = {IntegratorKind::kVerlet, IntegratorKind::kVerlet,
                                      IntegratorKind::kEuler, IntegratorKind::kMidpoint,
                                      IntegratorKind::kRk4};
+constexpr std::array kPrecisions = {Precision::kSingle, Precision::kSingle, Precision::kDouble};
 
 std::string at(const std::string& field, int index) {
   return field + "[" + std::to_string(index) + "]";
@@ -257,6 +258,7 @@ Environment Reader::environment(const v1::Environment& from) {
 SolverSettings Reader::solver(const v1::SolverSettings& from) {
   SolverSettings solver;
   solver.integrator = choice(kIntegrators, from.integrator(), "solver.integrator");
+  solver.precision = choice(kPrecisions, from.precision(), "solver.precision");
   if (from.has_frame_step_s()) solver.frame_step = from.frame_step_s();
   if (from.has_substep_s()) solver.substep = from.substep_s();
   solver.allow_unstable = from.allow_unstable();

@@ -151,6 +151,8 @@ void set(v1::SolverSettings* to, const SolverSettings& from) {
   if (from.substep) to->set_substep_s(*from.substep);
   to->set_allow_unstable(from.allow_unstable);
   to->set_safety(from.safety);
+  to->set_precision(from.precision == Precision::kSingle ? v1::PRECISION_SINGLE
+                                                         : v1::PRECISION_DOUBLE);
 }
 
 void set(v1::Scene* to, const Scene& from, const std::vector<Textile>& textiles,

@@ -153,7 +153,7 @@ void FrameStream::write_header() {
   v1::StreamHeader* header = message.mutable_header();
   header->set_session(request_.session());
   header->set_uid(session_->uid());
-  header->set_numerics_id(kNumericsId);
+  header->set_numerics_id(numerics_id());
   header->set_frame_step_s(session_->scene().solver.frame_step);
   std::int32_t first_particle = 0;
   for (const auto& sheet : session_->scene().sheets) {

@@ -1,12 +1,18 @@
 #include "server/rpc/server_service.h"
 
+#include "core/motion/lattice_sweep.h"
+
 namespace weft {
+
+std::string numerics_id() {
+  return std::string("weft-" WEFT_VERSION) + (sweeps_with_fma() ? "-fma" : "");
+}
 
 grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerContext* context,
                                                        const v1::GetServerInfoRequest*,
                                                        v1::ServerInfo* response) {
   response->set_version(WEFT_VERSION);
-  response->set_numerics_id(kNumericsId);
+  response->set_numerics_id(numerics_id());
   response->set_worker_threads(backend_.worker_threads);
   response->set_sessions(static_cast<std::int64_t>(backend_.registry.size()));
   v1::Limits* limits = response->mutable_limits();

@@ -6,7 +6,7 @@
 namespace weft {
 
 // Frames of servers with equal ids are equal to the bit.
-inline constexpr const char* kNumericsId = "weft-" WEFT_VERSION "-double";
+std::string numerics_id();
 
 class ServerService final : public v1::ServerService::CallbackService {
  public:

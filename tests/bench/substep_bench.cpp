@@ -1,4 +1,5 @@
 #include <benchmark/benchmark.h>
+#include <hwy/targets.h>
 
 #include <cstdlib>
 #include <string>
@@ -8,12 +9,29 @@
 namespace weft {
 namespace {
 
+struct Case {
+  int rows = 31;
+  Precision precision = Precision::kSingle;
+  std::int64_t target = 0;  // of Highway; 0: the plain solver
+  bool bare = false;        // neither damping nor compensation
+  ChoiKo law{};
+};
+
 // Substeps of a sheet of the paper's textile hung by two corners, from when it has begun to fall.
-void advance(benchmark::State& state, int rows, Evaluator evaluator) {
-  SheetDefinition sheet = testing::flat_sheet(rows, rows);
-  sheet.bending = ChoiKo{.evaluator = evaluator};
-  sheet.pins = {{{0, rows - 1}, {}}};
+void advance(benchmark::State& state, const Case& given) {
+  if (given.target != 0) {
+    if ((hwy::SupportedTargets() & given.target) == 0)
+      return state.SkipWithError("this processor lacks it");
+    hwy::SetSupportedTargetsForTest(given.target);
+  }
+  SheetDefinition sheet = testing::flat_sheet(given.rows, given.rows);
+  sheet.bending = given.law;
+  sheet.pins = {{{0, given.rows - 1}, {}}};
+  if (given.bare) sheet.textile.damping = 0;
   Scene scene = testing::floating(sheet);
+  scene.solver.precision = given.precision;
+  scene.solver.plain = given.target == 0;
+  scene.solver.compensated = !given.bare;
   scene.environment.gravity = {0, -9.8, 0};
   scene.solver.frame_step = 16 * Simulation(scene).plan().step.substep;
   Simulation simulation(scene);
@@ -23,18 +41,34 @@ void advance(benchmark::State& state, int rows, Evaluator evaluator) {
     if (!simulation.advance_frame()) state.SkipWithError("diverged");
   state.SetItemsProcessed(state.iterations() * simulation.plan().step.substeps *
                           simulation.particle_count());
+  hwy::SetSupportedTargetsForTest(0);
+}
+
+void add(const std::string& name, const Case& given) {
+  benchmark::RegisterBenchmark(name.c_str(),
+                               [given](benchmark::State& state) { advance(state, given); });
 }
 
 const bool added = [] {
-  const auto add = [](int rows, Evaluator evaluator, const char* law) {
+  for (const int rows : {31, 101, 317, 1000}) {
     const std::string size = std::to_string(rows) + "x" + std::to_string(rows);
-    benchmark::RegisterBenchmark(("substep/" + size + "/double/plain/" + law).c_str(),
-                                 [=](benchmark::State& state) { advance(state, rows, evaluator); });
-  };
+    for (const auto& [target, name] : {std::pair<std::int64_t, const char*>(HWY_AVX3, "AVX-512"),
+                                       std::pair<std::int64_t, const char*>(HWY_AVX2, "AVX2")}) {
+      const std::string end = std::string("/") + name + "/1";
+      add("substep/" + size + "/float" + end, {rows, Precision::kSingle, target});
+      add("substep/" + size + "/double" + end, {rows, Precision::kDouble, target});
+      add("substep_bare/" + size + "/float" + end, {rows, Precision::kSingle, target, true});
+    }
+  }
   for (const int rows : {31, 101}) {
-    add(rows, Evaluator::kLinearized, "LINEARIZED");
-    add(rows, Evaluator::kSeries, "SERIES");
-    add(rows, Evaluator::kExact, "EXACT");
+    const std::string size = std::to_string(rows) + "x" + std::to_string(rows);
+    const auto plain = [&](Evaluator evaluator, const char* law) {
+      add("substep/" + size + "/double/plain/1/" + law,
+          {rows, Precision::kDouble, 0, false, {.evaluator = evaluator}});
+    };
+    plain(Evaluator::kLinearized, "LINEARIZED");
+    plain(Evaluator::kSeries, "SERIES");
+    plain(Evaluator::kExact, "EXACT");
   }
   return true;
 }();

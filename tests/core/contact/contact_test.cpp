@@ -93,10 +93,10 @@ TEST(Contact, AFastParticleInAWedgeEndsOutsideBothBodiesInEitherOrder) {
   const Collider floor = body(Plane{}, 0), ball = body(Sphere{Vector3d(0, 0.1, 0), 0.3}, 0);
   const double skin = 1e-3;
   for (const auto& colliders : {std::vector{floor, ball}, std::vector{ball, floor}}) {
-    Matrix3Xd x = Vector3d(0.28, 0.01, 0), d = Vector3d(-0.03, -0.02, 0);
-    resolve_contacts(colliders, 0, skin, 1, 1e-3, VectorXd::Ones(1), x, d);
+    Vector3d x(0.28, 0.01, 0), d(-0.03, -0.02, 0);
+    EXPECT_TRUE(Contacts(colliders, 0, skin, 1, 1e-3).resolve(x, d));
     for (const Collider& collider : colliders)
-      EXPECT_GE(distance(collider, x.col(0), 1).value, 0) << collider.shape.index();
+      EXPECT_GE(distance(collider, x, 1).value, 0) << collider.shape.index();
   }
 }
 

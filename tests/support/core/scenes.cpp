@@ -19,6 +19,7 @@ SheetDefinition flat_sheet(int rows, int columns, double spacing) {
 
 Scene floating(const SheetDefinition& sheet) {
   Scene scene;
+  scene.solver.precision = Precision::kDouble;
   scene.sheets = {sheet};
   scene.environment.gravity.setZero();
   scene.solver.frame_step = 0.01;

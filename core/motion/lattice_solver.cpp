@@ -1,0 +1,186 @@
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/motion/lattice_law.h"
+#include "core/motion/sheet_solver.h"
+
+namespace weft {
+namespace {
+
+template <class T>
+class LatticeSolver : public SheetSolver {
+ public:
+  LatticeSolver(const SheetDefinition& sheet, const Dynamics& dynamics, bool compensated)
+      : dynamics_(dynamics),
+        columns_(sheet.grid.columns),
+        particles_(sheet.particle_count()),
+        damping_(sheet.textile.damping),
+        law_(make_sweep_law<T>(sheet)),
+        state_(law_.layout),
+        gap_(static_cast<std::size_t>(law_.layout.rows)) {
+    law_.compensated = compensated;
+  }
+
+  void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
+    dt_ = dt;
+    if (law_.compensated && !std::exchange(started_, true)) origin_ = x.rowwise().mean();
+    law_.damping = static_cast<T>(damping_ / (2 * dt));
+    // half a kick: x(-dt) = x - v dt + a dt^2 / 2
+    Matrix3Xd a;
+    accelerate(dynamics_, time, x, v, a);
+    for (int i = 0; i < particles_; ++i) {
+      set_position(i, x.col(i));
+      set_displacement(i, v.col(i) * dt - a.col(i) * (dt * dt / 2));
+      for (int axis = 0; axis < 3; ++axis)
+        at(State::kW, axis, i) = static_cast<T>(v(axis, i) * 2 * dt);
+      at(State::kStep2, 0, i) = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
+    }
+    std::fill(gap_.begin(), gap_.end(), 0);
+  }
+
+  void advance(double time) override {
+    Vector3d drift = dynamics_.gravity * (dt_ * dt_);
+    if (dynamics_.drag.size() > 0) {
+      const double rate = drag_rate();
+      law_.drag = static_cast<T>(rate * dt_);
+      drift += rate * dt_ * dt_ * dynamics_.air(time);
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      law_.drift[axis] = static_cast<T>(drift[static_cast<Eigen::Index>(axis)]);
+    moved_ = sweep(law_, state_);
+  }
+
+  void lead(int particle, const Vector3d& x, const Vector3d& d) override {
+    set_position(particle, x);
+    for (int axis = 0; axis < 3; ++axis)
+      at(State::kW, axis, particle) = static_cast<T>(3 * d[axis]) - at(State::kD, axis, particle);
+    set_displacement(particle, d);
+  }
+
+  // A row is looked at again when it, or a collider, may have come as far as its gap was wide.
+  void resolve(const Contacts& contacts) override {
+    law_.measured = true;
+    constexpr double kRounding = 1.001;
+    const double approach = kRounding * (moved_ + contacts.reach());
+    for (int r = 0; r < law_.layout.rows; ++r) {
+      double& gap = gap_[static_cast<std::size_t>(r)];
+      gap -= approach;
+      if (gap > 0) continue;
+      gap = resolve_row(contacts, r);
+    }
+  }
+
+  bool finite() const override {
+    for (int r = 0; r < law_.layout.rows; ++r)
+      for (int plane = 0; plane < State::kW; ++plane)
+        for (int c = 0; c < columns_; ++c)
+          if (!std::isfinite(state_.row(plane, r)[c])) return false;
+    return true;
+  }
+
+  void positions(Matrix3Xd& x) const override {
+    x.resize(3, particles_);
+    for (int i = 0; i < particles_; ++i) x.col(i) = position(i);
+  }
+  void velocities(Matrix3Xd& v) const override {
+    v.resize(3, particles_);
+    for (int i = 0; i < particles_; ++i)
+      for (int axis = 0; axis < 3; ++axis) v(axis, i) = double{at(State::kW, axis, i)} / (2 * dt_);
+  }
+  // v = d / dt + a dt / 2: d stands for the velocity half a step ago
+  void closing_velocities(double time, Matrix3Xd& v) override {
+    Matrix3Xd x, a;
+    positions(x);
+    velocities(v);
+    accelerate(dynamics_, time, x, v, a);
+    for (int i = 0; i < particles_; ++i) v.col(i) = displacement(i) / dt_ + a.col(i) * (dt_ / 2);
+  }
+
+ private:
+  using State = SweepState<T>;
+
+  T& at(int plane, int axis, int i) { return state_.row(plane + axis, i / columns_)[i % columns_]; }
+  const T& at(int plane, int axis, int i) const {
+    return state_.row(plane + axis, i / columns_)[i % columns_];
+  }
+
+  Vector3d value(int plane, int error, int i) const {
+    Vector3d out;
+    for (int axis = 0; axis < 3; ++axis)
+      out[axis] = double{at(plane, axis, i)} - double{at(error, axis, i)};
+    return out;
+  }
+  void set_value(int plane, int error, int i, const Vector3d& exact) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const T rounded = at(plane, axis, i) = static_cast<T>(exact[axis]);
+      at(error, axis, i) = law_.compensated ? static_cast<T>(double{rounded} - exact[axis]) : T(0);
+    }
+  }
+  Vector3d position(int i) const { return origin_ + value(State::kX, State::kXError, i); }
+  Vector3d displacement(int i) const { return value(State::kD, State::kDError, i); }
+  void set_position(int i, const Vector3d& x) {
+    set_value(State::kX, State::kXError, i, x - origin_);
+  }
+  void set_displacement(int i, const Vector3d& d) { set_value(State::kD, State::kDError, i, d); }
+
+  // Drag over mass is one for all particles: both go by area, 1/s.
+  double drag_rate() const {
+    Eigen::Index i = 0;
+    const double inverse_mass = dynamics_.inverse_mass.maxCoeff(&i);
+    return dynamics_.drag[i] * inverse_mass;
+  }
+
+  // Returns how far the row's free particles are from the nearest skin, m.
+  double resolve_row(const Contacts& contacts, int r) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int c = 0; c < columns_; ++c) {
+      const int i = r * columns_ + c;
+      if (dynamics_.inverse_mass[i] == 0) continue;
+      Vector3d x = position(i);
+      const double gap = contacts.gap(x);
+      nearest = std::min(nearest, gap);
+      if (gap >= 0) continue;
+      const Vector3d before = displacement(i);
+      Vector3d d = before;
+      contacts.resolve(x, d);
+      set_position(i, x);
+      set_displacement(i, d);
+      for (int axis = 0; axis < 3; ++axis)
+        at(State::kW, axis, i) += static_cast<T>(3 * (d[axis] - before[axis]));
+    }
+    return nearest;
+  }
+
+  const Dynamics& dynamics_;
+  int columns_, particles_;
+  double damping_, dt_ = 0;
+  SweepLaw<T> law_;
+  State state_;
+  bool started_ = false;
+  Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
+  double moved_ = 0;                    // farthest displacement of the last step, m
+  std::vector<double> gap_;             // of each row to the nearest skin, at most, m
+};
+
+}  // namespace
+
+std::unique_ptr<SheetSolver> make_lattice_solver(const SheetDefinition& sheet,
+                                                 const Dynamics& dynamics,
+                                                 const SolverSettings& settings) {
+  if (settings.precision == Precision::kDouble)
+    return std::make_unique<LatticeSolver<double>>(sheet, dynamics, false);
+  return std::make_unique<LatticeSolver<float>>(sheet, dynamics, settings.compensated);
+}
+
+std::string_view needs_plain_solver(const Scene& scene, const SheetDefinition& sheet) {
+  if (scene.solver.plain) return "asked for";
+  if (scene.solver.integrator != IntegratorKind::kVerlet) return "the integrator is not VERLET";
+  if (scene.environment.wind) return "the scene has wind";
+  const auto* law = std::get_if<ChoiKo>(&sheet.bending);
+  const bool slow = law != nullptr &&
+                    (law->evaluator == Evaluator::kSeries || law->evaluator == Evaluator::kExact);
+  return slow ? "the evaluator is SERIES or EXACT" : "";
+}
+
+}  // namespace weft

@@ -1,0 +1,55 @@
+#include "core/motion/sheet_solver.h"
+
+namespace weft {
+namespace {
+
+class PlainSolver : public SheetSolver {
+ public:
+  PlainSolver(const Dynamics& dynamics, IntegratorKind integrator)
+      : dynamics_(dynamics), integrator_(make_integrator(integrator)) {}
+
+  void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
+    dt_ = dt;
+    motion_.x = x;
+    integrator_->start(dynamics_, time, dt, v, motion_);
+  }
+
+  void advance(double time) override { integrator_->advance(dynamics_, time, dt_, motion_); }
+
+  void lead(int particle, const Vector3d& x, const Vector3d& d) override {
+    motion_.x.col(particle) = x;
+    motion_.d.col(particle) = d;
+  }
+
+  void resolve(const Contacts& contacts) override {
+    for (Eigen::Index i = 0; i < motion_.x.cols(); ++i) {
+      if (dynamics_.inverse_mass[i] == 0) continue;
+      Vector3d x = motion_.x.col(i), d = motion_.d.col(i);
+      if (!contacts.resolve(x, d)) continue;
+      motion_.x.col(i) = x;
+      motion_.d.col(i) = d;
+    }
+  }
+
+  bool finite() const override { return motion_.x.allFinite() && motion_.d.allFinite(); }
+  void positions(Matrix3Xd& x) const override { x = motion_.x; }
+  void velocities(Matrix3Xd& v) const override { integrator_->velocity(motion_, dt_, v); }
+  void closing_velocities(double time, Matrix3Xd& v) override {
+    integrator_->closing_velocity(dynamics_, time, dt_, motion_, v);
+  }
+
+ private:
+  const Dynamics& dynamics_;
+  std::unique_ptr<Integrator> integrator_;
+  Motion motion_;
+  double dt_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<SheetSolver> make_plain_solver(const Dynamics& dynamics,
+                                               IntegratorKind integrator) {
+  return std::make_unique<PlainSolver>(dynamics, integrator);
+}
+
+}  // namespace weft

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "core/contact/contact.h"
+#include "core/model/mesh.h"
+#include "core/motion/integrator.h"
+
+namespace weft {
+
+// Moves one sheet, in storage of its own. Steps are of one length from start() on.
+class SheetSolver {
+ public:
+  virtual ~SheetSolver() = default;
+
+  // Begins, or begins again, from positions (m) and velocities (m/s) at `time`, with steps of dt
+  // (s). (3 x particles)
+  virtual void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) = 0;
+  // One step of all free particles from `time`.
+  virtual void advance(double time) = 0;
+  // Puts a held particle where its path leads it: position and displacement of the step, m.
+  virtual void lead(int particle, const Vector3d& x, const Vector3d& d) = 0;
+  // Moves free particles out of colliders.
+  virtual void resolve(const Contacts& contacts) = 0;
+
+  virtual bool finite() const = 0;
+  // Present state: m, m/s.
+  virtual void positions(Matrix3Xd& x) const = 0;
+  virtual void velocities(Matrix3Xd& v) const = 0;
+  // Velocities as the forces at `time` complete them, m/s: what start() needs to go on with other
+  // forces or another dt without losing an order.
+  virtual void closing_velocities(double time, Matrix3Xd& v) = 0;
+};
+
+// One connection after the other, in double; any integrator, any force.
+std::unique_ptr<SheetSolver> make_plain_solver(const Dynamics& dynamics, IntegratorKind integrator);
+
+// Rows of a lattice in vectors: Verlet without wind. `dynamics` are the same forces in double, for
+// starts; both must outlive the solver.
+std::unique_ptr<SheetSolver> make_lattice_solver(const SheetDefinition& sheet,
+                                                 const Dynamics& dynamics,
+                                                 const SolverSettings& settings);
+
+// What make_lattice_solver() cannot step, as a reason; empty where it can.
+std::string_view needs_plain_solver(const Scene& scene, const SheetDefinition& sheet);
+
+}  // namespace weft

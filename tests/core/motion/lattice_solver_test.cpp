@@ -1,0 +1,243 @@
+#include <gmock/gmock.h>
+#include <hwy/targets.h>
+
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "core/contact/contact.h"
+#include "core/motion/lattice_law.h"
+#include "tests/support/core/scenes.h"
+
+// The vector kernels are held to the plain solver, which evaluates one connection after the other.
+namespace weft {
+namespace {
+
+using testing::flat_sheet;
+using testing::floating;
+using testing::noise;
+using testing::positions;
+using testing::velocities;
+
+constexpr int kSteps = 4;
+
+// A crumpled sheet in motion, two corners held.
+Scene crumpled(SheetDefinition sheet) {
+  const double h = sheet.grid.spacing;
+  const int n = sheet.particle_count();
+  sheet.start_positions = testing::values(start_positions(sheet) + 0.3 * h * noise(n));
+  sheet.start_velocities = testing::values(0.5 * noise(n, 2));
+  sheet.pins = {{{0, sheet.grid.columns - 1}, {}}};
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0.3, -9.8, 0.1};
+  scene.solver.substep = 0.5 * Simulation(scene).plan().step.linear_bound;
+  scene.solver.frame_step = *scene.solver.substep;
+  return scene;
+}
+
+Simulation after(Scene scene, int frames) {
+  Simulation simulation(std::move(scene));
+  for (int k = 0; k < frames; ++k) EXPECT_TRUE(simulation.advance_frame());
+  return simulation;
+}
+
+// Rounding puts k eps (|x| + l) into a force, |x| the sheet's extent; 12 connections a particle,
+// each of less than 16 roundings; with k dt^2 / m below the bound's 1 / 2 an acceleration error of
+// every step adds up to n (n + 1) / 2 of them.
+double tolerance(const Scene& scene, double epsilon) {
+  const Grid& grid = scene.sheets[0].grid;
+  const double extent = grid.spacing * (std::max(grid.rows, grid.columns) + 2);
+  return epsilon * extent * 12 * 16 * 0.5 * kSteps * (kSteps + 1) / 2;
+}
+
+void expect_like_plain(const SheetDefinition& sheet, const std::string& what) {
+  Scene scene = crumpled(sheet);
+  scene.solver.plain = true;
+  const Simulation plain = after(scene, kSteps);
+  scene.solver.plain = false;
+  for (const Precision precision : {Precision::kDouble, Precision::kSingle}) {
+    scene.solver.precision = precision;
+    const Simulation fast = after(scene, kSteps);
+    const bool single = precision == Precision::kSingle;
+    const double epsilon =
+        single ? std::numeric_limits<float>::epsilon() : std::numeric_limits<double>::epsilon();
+    const double most = tolerance(scene, epsilon);
+    EXPECT_LE((positions(fast) - positions(plain)).cwiseAbs().maxCoeff(), most)
+        << what << (single ? ", single" : ", double");
+    EXPECT_LE(
+        (velocities(fast) - velocities(plain)).cwiseAbs().maxCoeff() * scene.solver.frame_step,
+        4 * most)
+        << what << (single ? ", single" : ", double");
+  }
+}
+
+constexpr std::pair<int, int> kSizes[] = {{2, 2},   {2, 3},   {3, 2},   {4, 5},   {5, 16},
+                                          {6, 17},  {7, 18},  {16, 19}, {17, 33}, {31, 31},
+                                          {33, 34}, {40, 35}, {3, 64},  {70, 33}};
+
+struct Feature {
+  const char* name;
+  void (*set)(SheetDefinition&);
+};
+
+Textile measured(double shear, double drag, double damping) {
+  MeasuredTextile textile;
+  textile.areal_density = 0.2;
+  textile.tensile_warp = 900;
+  textile.tensile_weft = 600;
+  textile.shear = shear;
+  textile.bend_rigidity_warp = 2e-4;
+  textile.bend_rigidity_weft = 1e-4;
+  textile.air_drag = drag;
+  return {textile, damping, 0.3};
+}
+RawTextile& raw(SheetDefinition& sheet) { return std::get<RawTextile>(sheet.textile.model); }
+
+const Feature kFeatures[] = {
+    {"EverythingOn", [](SheetDefinition&) {}},
+    {"NoDamping", [](SheetDefinition& s) { s.textile.damping = 0; }},
+    {"NoShear", [](SheetDefinition& s) { raw(s).shear = 0; }},
+    {"NoStretch", [](SheetDefinition& s) { raw(s).stretch = 0, raw(s).clamp = 100; }},
+    {"NoBend", [](SheetDefinition& s) { raw(s).bend = 0; }},
+    {"NoBendNoShearNoDamping",
+     [](SheetDefinition& s) { raw(s).bend = raw(s).shear = s.textile.damping = 0; }},
+    {"NoDiagonalBend", [](SheetDefinition& s) { s.bending = ChoiKo{.diagonal_bend = false}; }},
+    {"NoDiagonalBendNoShear",
+     [](SheetDefinition& s) { raw(s).shear = 0, s.bending = ChoiKo{.diagonal_bend = false}; }},
+    {"Drag", [](SheetDefinition& s) { raw(s).air_drag = 0.02; }},
+    {"TwoSegments", [](SheetDefinition& s) { s.bending = ChoiKo{.segments = 2}; }},
+    {"SixtySegments", [](SheetDefinition& s) { s.bending = ChoiKo{.segments = 60}; }},
+    {"FoldedClamp",
+     [](SheetDefinition& s) { s.bending = ChoiKo{.segments = 5, .fold_clamp = true}; }},
+    {"Polynomial",
+     [](SheetDefinition& s) { s.bending = ChoiKo{.evaluator = Evaluator::kPolynomial}; }},
+    {"PolynomialOfDegree1",
+     [](SheetDefinition& s) {
+       s.bending = ChoiKo{.evaluator = Evaluator::kPolynomial, .degree = 1};
+     }},
+    {"ClampRules", [](SheetDefinition& s) { raw(s).bend = 0.1; }},
+    {"Isometric", [](SheetDefinition& s) { s.bending = Isometric{}; }},
+    {"IsometricMeasuredWithDrag",
+     [](SheetDefinition& s) { s.textile = measured(20, 0.1, 1e-3), s.bending = Isometric{}; }},
+    {"Measured", [](SheetDefinition& s) { s.textile = measured(20, 0, 1e-3); }},
+    {"MeasuredNoShear", [](SheetDefinition& s) { s.textile = measured(0, 0.1, 0); }},
+};
+
+class Kernels : public ::testing::TestWithParam<Feature> {};
+
+TEST_P(Kernels, FollowThePlainSolverOnEverySize) {
+  for (const auto& [rows, columns] : kSizes) {
+    SheetDefinition sheet = flat_sheet(rows, columns);
+    GetParam().set(sheet);
+    expect_like_plain(sheet, std::to_string(rows) + " x " + std::to_string(columns));
+  }
+}
+
+template <class T>
+void fill_with_nan(SweepState<T>& state, const RowLayout& layout) {
+  for (int r = 0; r < layout.rows; ++r)
+    for (int plane = 0; plane < SweepState<T>::kPlanes; ++plane)
+      for (auto c = std::ptrdiff_t{layout.columns}; c < layout.stride(); ++c)
+        state.row(plane, r)[c] = std::numeric_limits<T>::quiet_NaN();
+}
+
+// Every value of the lattice after some sweeps from fixed positions.
+template <class T>
+std::vector<T> swept(const SheetDefinition& sheet, bool poisoned) {
+  using State = SweepState<T>;
+  SweepLaw<T> law = make_sweep_law<T>(sheet);
+  law.damping = static_cast<T>(sheet.textile.damping / (2 * 1e-4));
+  law.drift = {0, T(-1e-7), 0};
+  State state(law.layout);
+  if (poisoned) fill_with_nan(state, law.layout);
+  const Matrix3Xd x = start_positions(sheet) + 0.01 * noise(sheet.particle_count());
+  std::vector<T> out;
+  for (int step = -1; step < 3; ++step) {
+    if (step >= 0) sweep(law, state);
+    for (int i = 0; i < sheet.particle_count(); ++i) {
+      const int r = i / sheet.grid.columns, c = i % sheet.grid.columns;
+      for (int axis = 0; axis < 3 && step < 0; ++axis)
+        state.row(State::kX + axis, r)[c] = static_cast<T>(x(axis, i));
+      if (step < 0) state.row(State::kStep2, r)[c] = T(1e-5);
+      for (int plane = 0; plane < State::kPlanes && step >= 0; ++plane)
+        out.push_back(state.row(plane, r)[c]);
+    }
+  }
+  return out;
+}
+
+TEST_P(Kernels, HearNothingOfTheirPadding) {
+  for (const auto& [rows, columns] : {std::pair(5, 16), std::pair(4, 31), std::pair(6, 37)}) {
+    SheetDefinition sheet = flat_sheet(rows, columns);
+    GetParam().set(sheet);
+    EXPECT_EQ(swept<float>(sheet, true), swept<float>(sheet, false)) << columns;
+    EXPECT_EQ(swept<double>(sheet, true), swept<double>(sheet, false)) << columns;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sheets, Kernels, ::testing::ValuesIn(kFeatures),
+                         [](const auto& feature) { return std::string(feature.param.name); });
+
+// FNV-1a over the bits of all values.
+std::uint64_t hash_of(const Matrix3Xd& values) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const double value : values.reshaped()) {
+    hash ^= std::bit_cast<std::uint64_t>(value);
+    hash *= 0x100000001b3u;
+  }
+  return hash;
+}
+
+std::uint64_t hash_of_run(Precision precision, std::int64_t target) {
+  hwy::SetSupportedTargetsForTest(target);
+  Scene scene = crumpled(flat_sheet(23, 37));
+  scene.solver.precision = precision;
+  scene.solver.substep = scene.solver.frame_step = 2e-4;
+  const Simulation simulation = after(scene, 200);
+  hwy::SetSupportedTargetsForTest(0);
+  return hash_of(positions(simulation));
+}
+
+// Golden hashes: they guard that results repeat to the bit, not that they are right.
+TEST(Repeatability, RunsHaveTheSameBitsOnEveryProcessorWithFma) {
+  int targets = 0;
+  for (const std::int64_t target : {HWY_AVX2, HWY_AVX3}) {
+    if ((hwy::SupportedTargets() & target) == 0) continue;
+    ++targets;
+    EXPECT_EQ(hash_of_run(Precision::kSingle, target), 3825049640224582598u)
+        << hwy::TargetName(target);
+    EXPECT_EQ(hash_of_run(Precision::kDouble, target), 16777615481164120541u)
+        << hwy::TargetName(target);
+  }
+  if (targets == 0) GTEST_SKIP() << "this processor has no FMA";
+}
+
+// Where the plain path looks at every particle in every step, the fast one looks when it must.
+TEST(FarContacts, AreSkippedWithoutMissingOne) {
+  SheetDefinition sheet = flat_sheet(15, 15);
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.colliders = {{"ball", Sphere{Vector3d(0.2, -0.3, 0.2), 0.2}, 0.3, {}},
+                     {"lift",
+                      Plane{Vector3d(0, -0.6, 0), Vector3d::UnitY()},
+                      0.3,
+                      {{0, Vector3d::Zero()}, {0.2, Vector3d(0, 0.1, 0)}}}};
+  Simulation fast(scene);
+  scene.solver.plain = true;
+  Simulation plain(scene);
+  for (int frame = 0; frame < 30; ++frame) {
+    ASSERT_TRUE(fast.advance_frame());
+    ASSERT_TRUE(plain.advance_frame());
+    const Matrix3Xd x = positions(fast);
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+      for (const Collider& collider : scene.colliders)
+        ASSERT_GE(distance(collider, x.col(i), fast.time()).value, 0) << frame;
+    if (frame < 20) {
+      ASSERT_LE((x - positions(plain)).cwiseAbs().maxCoeff(), 1e-9) << frame;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace weft

@@ -124,7 +124,8 @@ HWY_INLINE V line(D d, const BendLaw<hn::TFromD<D>>& law, V at, V l) {
   }
 #endif
   const hn::RebindToSigned<D> di;
-  const auto i = hn::ConvertTo(di, hn::Min(at, hn::Set(d, law.last)));
+  const V last = hn::Set(d, law.last);
+  const auto i = hn::ConvertTo(di, hn::IfThenElse(hn::Lt(at, last), at, last));  // NaN: the last
   return hn::MulAdd(hn::GatherIndex(d, b, i), l, hn::GatherIndex(d, a, i));
 }
 

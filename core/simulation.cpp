@@ -71,7 +71,8 @@ struct Simulation::State {
   std::vector<Sheet> sheets;
   std::int64_t frame = 0;
   int frames_at_rest = 0;
-  double rest_after = 0;  // s
+  std::int64_t substeps = 0;  // of the last frame
+  double rest_after = 0;      // s
 
   explicit State(Scene given);
   void bind_forces();
@@ -205,6 +206,13 @@ bool Simulation::advance_frame() {
   assert(!refusal());
   State& state = *state_;
   const StepPlan& step = state.plan.step;
+  const bool asleep = at_rest() && !state.scene.environment.wind;
+  state.substeps = asleep ? 0 : step.substeps;
+  if (asleep) {
+    ++state.frame;
+    return true;
+  }
+
   const double begin = state.time();
   for (std::int64_t k = 0; k < step.substeps; ++k)
     state.step(begin + static_cast<double>(k) * step.substep, step.substep);
@@ -214,6 +222,8 @@ bool Simulation::advance_frame() {
   state.frames_at_rest = state.quiet() ? state.frames_at_rest + 1 : 0;
   return true;
 }
+
+std::int64_t Simulation::substeps() const { return state_->substeps; }
 
 bool Simulation::at_rest() const {
   constexpr int kFrames = 30;

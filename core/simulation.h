@@ -39,8 +39,11 @@ class Simulation {
   std::optional<StepRefusal> refusal() const;
 
   // Advances by one frame step. Returns false, and leaves the frame unfinished for good, when a
-  // position stopped being finite.
+  // position stopped being finite. A scene at rest, without wind, sleeps: the frame repeats without
+  // a substep until a textile changes.
   [[nodiscard]] bool advance_frame();
+  // Substeps that the last frame took.
+  std::int64_t substeps() const;
 
   std::int64_t frame() const;
   double time() const;         // s

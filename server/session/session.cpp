@@ -34,7 +34,7 @@ Session::Session(std::string id, Simulation simulation, std::size_t history_byte
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),
       history_(history_bytes) {
-  history_.push(make_frame(0), 0);
+  history_.push(make_frame(), 0);
 }
 
 SessionStatus Session::status() const {
@@ -242,7 +242,7 @@ void Session::compute_frame() {
     return fail("the solver diverged in frame " + std::to_string(simulation_.frame() + 1) +
                 ": a position stopped being finite");
   }
-  const auto frame = make_frame(simulation_.plan().step.substeps);
+  const auto frame = make_frame();
   {
     std::lock_guard lock(mutex_);
     if (closed_) return;
@@ -270,7 +270,7 @@ std::optional<Clock::time_point> Session::next_due() {
   return run_->start_time + std::chrono::duration_cast<Clock::duration>(since_start);
 }
 
-std::shared_ptr<const Frame> Session::make_frame(std::int64_t substeps) const {
+std::shared_ptr<const Frame> Session::make_frame() const {
   auto frame = std::make_shared<Frame>();
   const std::size_t values = 3 * static_cast<std::size_t>(simulation_.particle_count());
   frame->number = simulation_.frame();
@@ -281,7 +281,7 @@ std::shared_ptr<const Frame> Session::make_frame(std::int64_t substeps) const {
   simulation_.copy_velocities(frame->velocities);
   frame->stats = simulation_.stats();
   frame->at_rest = simulation_.at_rest();
-  frame->substeps = substeps;
+  frame->substeps = simulation_.substeps();
   frame->substep = simulation_.plan().step.substep;
   return frame;
 }

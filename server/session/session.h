@@ -86,7 +86,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   void compute_frame();
   void fail(const std::string& why);
   std::optional<Clock::time_point> next_due();
-  std::shared_ptr<const Frame> make_frame(std::int64_t substeps) const;
+  std::shared_ptr<const Frame> make_frame() const;
 
   // with the mutex held
   std::int64_t latest() const { return history_.latest()->number; }

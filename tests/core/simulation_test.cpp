@@ -202,6 +202,42 @@ TEST(Simulation, ASheetComesToRestAndIsToldSo) {
   EXPECT_LT(simulation.stats().kinetic_energy, 1e-6 * 49e-3 * 9.8 * 0.3);
 }
 
+TEST(Simulation, ASceneAtRestSleepsUntilItsTextileChanges) {
+  Scene scene = hanging();
+  std::get<RawTextile>(scene.sheets[0].textile.model).air_drag = 0.02;
+  Simulation simulation(scene);
+  while (!simulation.at_rest() && simulation.time() < 100) run(simulation, 1);
+  EXPECT_GT(simulation.substeps(), 0);
+  const Matrix3Xd x = positions(simulation);
+  const double time = simulation.time();
+  run(simulation, 10);
+  EXPECT_EQ(simulation.substeps(), 0);
+  EXPECT_EQ(positions(simulation), x);
+  EXPECT_NEAR(simulation.time() - time, 10 * scene.solver.frame_step, 1e-9);
+
+  Textile softer = scene.sheets[0].textile;
+  std::get<RawTextile>(softer.model).stretch /= 10;
+  ASSERT_FALSE(simulation.set_textile(0, softer));
+  run(simulation, 10);
+  EXPECT_GT(simulation.substeps(), 0);
+  EXPECT_GT((positions(simulation) - x).cwiseAbs().maxCoeff(), 1e-4);
+}
+
+// A path that begins later is not slept through.
+TEST(Simulation, ASceneWithAPathAheadStaysAwake) {
+  SheetDefinition sheet = flat_sheet(3, 3);
+  sheet.textile.damping = 1;
+  Collider lift{"lift",
+                Plane{Vector3d(0, -1, 0), Vector3d::UnitY()},
+                0.3,
+                {{1, Vector3d::Zero()}, {2, Vector3d(0, 2, 0)}}};
+  Scene scene = floating(sheet);
+  scene.colliders = {lift};
+  Simulation simulation(scene);
+  while (simulation.time() < 2.5) run(simulation, 1);
+  EXPECT_GT(positions(simulation).row(1).minCoeff(), 0.9);
+}
+
 TEST(Simulation, AChangeOfTextileKeepsPositionsAndVelocities) {
   Simulation simulation(hanging());
   run(simulation, 20);

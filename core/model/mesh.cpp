@@ -103,10 +103,11 @@ LatticeConstants lattice_constants(const SheetDefinition& sheet) {
       sheet.textile.model);
 }
 
-IsometricStiffness isometric_stiffness(const LatticeConstants& k, double h) {
-  // width of a strip h; 2 B_t is the sum of both rigidities
-  return {k.rigidity_warp / (h * h), k.rigidity_weft / (h * h),
-          (k.rigidity_warp + k.rigidity_weft) / (h * h)};
+IsometricStiffness isometric_stiffness(const LatticeConstants& constants, double spacing) {
+  // width of a strip: the spacing; 2 B_t: the sum of both rigidities
+  const double square = spacing * spacing;
+  return {constants.rigidity_warp / square, constants.rigidity_weft / square,
+          (constants.rigidity_warp + constants.rigidity_weft) / square};
 }
 
 Mesh make_lattice(const SheetDefinition& sheet) {

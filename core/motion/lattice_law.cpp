@@ -2,17 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 namespace weft {
 namespace {
 
 template <class T>
-BendLaw<T> bend_law(const BendingForce& force, int terms) {
+BendLaw<T> bend_law(const BendingForce& force, int terms, double share) {
   BendLaw<T> law;
-  const double length = force.rest_length(), scale = force.scale();
-  law.clamp = static_cast<T>(force.clamp());
-  law.clamp_rest = static_cast<T>(force.clamp() * length);
+  const double length = force.rest_length(), scale = share * force.scale();
+  law.clamp = static_cast<T>(share * force.clamp());
+  law.clamp_rest = static_cast<T>(share * force.clamp() * length);
   law.last = static_cast<T>(terms - 1);
   const auto size = static_cast<std::size_t>(std::max(terms, 32));
   law.intercepts = AlignedArray<T>(size);
@@ -50,6 +51,7 @@ void set_bending(const SheetDefinition& sheet, const LatticeConstants& k, SweepL
     const IsometricStiffness stiffness = isometric_stiffness(k, h);
     if (k.rigidity_warp + k.rigidity_weft > 0) law.bend = BendKind::kIsometric;
     law.isometric_warp = static_cast<T>(stiffness.warp);
+    law.isometric_warp_edge = static_cast<T>(k.edge_share * stiffness.warp);
     law.isometric_weft = static_cast<T>(stiffness.weft);
     law.isometric_twist = static_cast<T>(stiffness.twist);
     return;
@@ -59,12 +61,13 @@ void set_bending(const SheetDefinition& sheet, const LatticeConstants& k, SweepL
   law.terms = table ? choi_ko->segments : choi_ko->degree + 1;
   law.none = no_bend<T>(law.terms);
   bool bends = false;
-  const auto make = [&](double bend, double clamp, double length) {
+  const auto make = [&](double bend, double clamp, double length, double share = 1) {
     if (bend == 0 || clamp == 0) return no_bend<T>(law.terms);
     bends = true;
-    return bend_law<T>(BendingForce(*choi_ko, bend, clamp, length), law.terms);
+    return bend_law<T>(BendingForce(*choi_ko, bend, clamp, length), law.terms, share);
   };
   law.along_warp = make(k.bend_warp, k.clamp_warp, 2 * h);
+  law.along_warp_edge = make(k.bend_warp, k.clamp_warp, 2 * h, k.edge_share);
   law.along_weft = make(k.bend_weft, k.clamp_weft, 2 * h);
   law.bend_diagonal = choi_ko->diagonal_bend && k.bend_diagonal > 0 && k.clamp_diagonal > 0;
   if (law.bend_diagonal)
@@ -73,6 +76,52 @@ void set_bending(const SheetDefinition& sheet, const LatticeConstants& k, SweepL
   law.bend = !table            ? BendKind::kPolynomial
              : law.terms <= 32 ? BendKind::kTable32
                                : BendKind::kTable;
+}
+
+template <class T>
+void set_columns(double edge_share, SweepLaw<T>& law) {
+  constexpr int kLanes = LatticeLayout<T>::kLanes;
+  const LatticeLayout<T>& layout = law.layout;
+  const int n = layout.vectors();
+  const auto has = [&](int c) { return c >= 0 && c < layout.columns; };
+  const auto bits = [](bool on) {
+    T value = 0;
+    if (on) std::memset(&value, 0xff, sizeof value);
+    return value;
+  };
+
+  law.columns = AlignedArray<T>(static_cast<std::size_t>(n * kColumnPlanes * kLanes));
+  law.border.resize(static_cast<std::size_t>(n));
+  for (int j = 0; j < n; ++j) {
+    char& border = law.border[static_cast<std::size_t>(j)];
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const int c = layout.column(j, lane);
+      T* const at = law.columns.data() + j * kColumnPlanes * kLanes + lane;
+      at[kShare * kLanes] = static_cast<T>(has(c - 1) && has(c + 1) ? 1 : edge_share);
+      at[kNearCount * kLanes] = static_cast<T>(has(c - 1) + has(c) + has(c + 1));
+      at[kFarCount * kLanes] = static_cast<T>(has(c - 2) + has(c) + has(c + 2));
+      at[kHere * kLanes] = bits(has(c));
+      at[kRight1 * kLanes] = bits(has(c) && has(c + 1));
+      at[kRight2 * kLanes] = bits(has(c) && has(c + 2));
+      at[kLeft1 * kLanes] = bits(has(c) && has(c - 1));
+      at[kLeft2 * kLanes] = bits(has(c) && has(c - 2));
+      for (const int neighbour : {c - 2, c - 1, c + 1, c + 2})
+        if (has(neighbour) != has(c)) border = 1;
+    }
+  }
+
+  for (const int c : {layout.columns, layout.columns + 1})
+    if (layout.lane(c) < kLanes) law.padded.push_back(layout.vector(c));
+
+  law.halo_exists = AlignedArray<T>(2 * layout.kHalo * kLanes);
+  law.halo_folds = AlignedArray<T>(2 * layout.kHalo * kLanes);
+  for (int k = 0; k < 2 * layout.kHalo; ++k) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      law.halo_exists.data()[k * kLanes + lane] = bits(has(layout.column(layout.halo(k), lane)));
+      const int from = lane - layout.halo_shift(k);
+      law.halo_folds.data()[k * kLanes + lane] = bits(from >= 0 && from < kLanes);
+    }
+  }
 }
 
 }  // namespace
@@ -87,25 +136,16 @@ SweepLaw<T> make_sweep_law(const SheetDefinition& sheet) {
   SweepLaw<T> law;
   law.layout = {sheet.grid.rows, sheet.grid.columns};
   law.warp = stretch(k.stretch_warp, h);
+  law.warp_edge = stretch(k.edge_share * k.stretch_warp, h);
   law.weft = stretch(k.stretch_weft, h);
   law.shear = stretch(k.shear, h * std::numbers::sqrt2);
-  law.edge_share = static_cast<T>(k.edge_share);
   set_bending(sheet, k, law);
   if (const auto* choi_ko = std::get_if<ChoiKo>(&sheet.bending)) {
     law.damp_far = true;
     law.damp_far_diagonal = choi_ko->diagonal_bend;
   }
 
-  const int columns = law.layout.columns;
-  const auto per_column = [&](const auto& value) {
-    AlignedArray<T> out(static_cast<std::size_t>(law.layout.stride() + RowLayout::kLanes));
-    for (int c = 0; c < columns; ++c) out.data()[RowLayout::kLanes + c] = static_cast<T>(value(c));
-    return out;
-  };
-  const auto has = [&](int c) { return c >= 0 && c < columns ? 1 : 0; };
-  law.column_share = per_column([&](int c) { return has(c - 1) && has(c + 1) ? 1 : k.edge_share; });
-  law.near_columns = per_column([&](int c) { return has(c - 1) + 1 + has(c + 1); });
-  law.far_columns = per_column([&](int c) { return has(c - 2) + 1 + has(c + 2); });
+  set_columns(k.edge_share, law);
   return law;
 }
 

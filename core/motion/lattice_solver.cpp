@@ -17,7 +17,7 @@ class LatticeSolver : public SheetSolver {
         particles_(sheet.particle_count()),
         damping_(sheet.textile.damping),
         law_(make_sweep_law<T>(sheet)),
-        state_(law_.layout),
+        state_(law_.layout, compensated),
         gap_(static_cast<std::size_t>(law_.layout.rows)) {
     law_.compensated = compensated;
   }
@@ -72,10 +72,9 @@ class LatticeSolver : public SheetSolver {
   }
 
   bool finite() const override {
-    for (int r = 0; r < law_.layout.rows; ++r)
-      for (int plane = 0; plane < State::kW; ++plane)
-        for (int c = 0; c < columns_; ++c)
-          if (!std::isfinite(state_.row(plane, r)[c])) return false;
+    for (int i = 0; i < particles_; ++i)
+      for (int plane = 0; plane < state_.planes(); ++plane)
+        if (!std::isfinite(at(plane, 0, i))) return false;
     return true;
   }
 
@@ -100,21 +99,23 @@ class LatticeSolver : public SheetSolver {
  private:
   using State = SweepState<T>;
 
-  T& at(int plane, int axis, int i) { return state_.row(plane + axis, i / columns_)[i % columns_]; }
+  T& at(int plane, int axis, int i) { return state_.at(plane + axis, i / columns_, i % columns_); }
   const T& at(int plane, int axis, int i) const {
-    return state_.row(plane + axis, i / columns_)[i % columns_];
+    return state_.at(plane + axis, i / columns_, i % columns_);
   }
 
   Vector3d value(int plane, int error, int i) const {
     Vector3d out;
-    for (int axis = 0; axis < 3; ++axis)
-      out[axis] = double{at(plane, axis, i)} - double{at(error, axis, i)};
+    for (int axis = 0; axis < 3; ++axis) {
+      out[axis] = at(plane, axis, i);
+      if (law_.compensated) out[axis] -= double{at(error, axis, i)};
+    }
     return out;
   }
   void set_value(int plane, int error, int i, const Vector3d& exact) {
     for (int axis = 0; axis < 3; ++axis) {
       const T rounded = at(plane, axis, i) = static_cast<T>(exact[axis]);
-      at(error, axis, i) = law_.compensated ? static_cast<T>(double{rounded} - exact[axis]) : T(0);
+      if (law_.compensated) at(error, axis, i) = static_cast<T>(double{rounded} - exact[axis]);
     }
   }
   Vector3d position(int i) const { return origin_ + value(State::kX, State::kXError, i); }

@@ -25,14 +25,29 @@ class AlignedArray {
   std::size_t size_ = 0;
 };
 
-// Rows of a lattice. Values of a row are padded to whole vectors, and by one vector more.
-struct RowLayout {
-  static constexpr int kLanes = 16;  // values of the widest vector
+// How a row of a lattice lies in vectors: it is cut into as many runs of columns as a vector has
+// lanes, and vector j holds column j of every run. The neighbours of a whole vector are then whole
+// vectors, save that the ends of the runs meet in a neighbour's lane: there a halo stands in.
+template <class T>
+struct LatticeLayout {
+  static constexpr int kLanes = 64 / sizeof(T);  // of the widest vector
 
   int rows = 0, columns = 0;
 
-  int width() const { return (columns + kLanes - 1) / kLanes * kLanes; }
-  std::ptrdiff_t stride() const { return width() + kLanes; }
+  // Vectors of a row, columns of a run.
+  int vectors() const { return (columns + kLanes - 1) / kLanes; }
+  int vector(int column) const { return column % vectors(); }
+  int lane(int column) const { return column / vectors(); }
+  int column(int vector, int lane) const { return lane * vectors() + vector; }
+
+  // The halo: copies before the first and after the last vector, k = 0 ... 2 kHalo - 1. Where copy
+  // k stands, and by how many lanes it is shifted against the vector that it continues.
+  static constexpr int kHalo = 2;
+  int halo(int k) const { return k < kHalo ? k - kHalo : vectors() + k - kHalo; }
+  int halo_shift(int k) const {
+    const int at = halo(k), n = vectors();
+    return at < 0 ? -((n - 1 - at) / n) : at / n;
+  }
 };
 
 // Tension k (l - L) of a family of connections, where it is taut (eq. 2).
@@ -49,60 +64,98 @@ struct BendLaw {
   T clamp_rest = 0;  // c_b L, N
   T to_index = 0;    // segments / L, or 2 / L of a polynomial in 2 r - 1, 1/m
   T last = 0;        // the last segment
-  // f_b = intercept + slope l of each segment (N, N/m), or the polynomial's coefficients, highest
-  // power first (N)
+  // f_b = intercept + slope l of each segment (N, N/m), 32 at least, or the polynomial's
+  // coefficients, highest power first (N)
   AlignedArray<T> intercepts, slopes;
 };
 
 enum class BendKind { kNone, kTable32, kTable, kPolynomial, kIsometric };
 
+// What the columns of a vector differ in.
+enum ColumnPlane {
+  kShare,      // of connections along the column
+  kNearCount,  // how many of the columns c - 1 ... c + 1 exist
+  kFarCount,   // how many of c - 2, c, c + 2
+  // all bits where the column and this neighbour exist, else none
+  kHere,
+  kRight1,
+  kRight2,
+  kLeft1,
+  kLeft2,
+  kColumnPlanes
+};
+
 // What one substep does to a lattice sheet.
 template <class T>
 struct SweepLaw {
-  RowLayout layout;
-  StretchLaw<T> warp, weft, shear;
-  T edge_share = 1;  // of connections that lie along an edge
+  LatticeLayout<T> layout;
+  StretchLaw<T> warp, weft, shear, warp_edge;  // warp_edge: along the first and the last row
   BendKind bend = BendKind::kNone;
   bool bend_diagonal = false;
-  int terms = 0;                                      // segments, or coefficients of the polynomial
-  BendLaw<T> along_warp, along_weft, diagonal, none;  // none: no force, for rows that do not exist
-  T isometric_warp = 0, isometric_weft = 0, isometric_twist = 0;  // N/m
-  T damping = 0;                                                  // k_d / (2 dt), kg/s^2
-  bool damp_far = false, damp_far_diagonal = false;               // bend connections damp too
-  T drag = 0;                                                     // c dt / m
-  std::array<T, 3> drift{};                                       // (gravity + c / m air) dt^2, m
-  bool compensated = true;                                        // the sums of d and x
-  bool measured = false;  // whether sweep() says how far particles went
-  // per column, from kLanes before the first: its share of connections along it, and how many of
-  // the columns c - 1 ... c + 1, and c - 2, c, c + 2, exist
-  AlignedArray<T> column_share, near_columns, far_columns;
+  int terms = 0;  // segments, or coefficients of the polynomial
+  BendLaw<T> along_warp, along_warp_edge, along_weft, diagonal;
+  BendLaw<T> none;                                // no force, for rows that do not exist
+  T isometric_warp = 0, isometric_warp_edge = 0;  // N/m
+  T isometric_weft = 0, isometric_twist = 0;
+  T damping = 0;                                     // k_d / (2 dt), kg/s^2
+  bool damp_far = false, damp_far_diagonal = false;  // bend connections damp too
+  T drag = 0;                                        // c dt / m
+  std::array<T, 3> drift{};                          // (gravity + c / m air) dt^2, m
+  bool compensated = true;                           // the sums of d and x
+  bool measured = false;                             // whether sweep() says how far particles went
+
+  AlignedArray<T> columns;   // (vectors x kColumnPlanes x lanes)
+  std::vector<char> border;  // of each vector: whether some column lacks a neighbour
+  std::vector<int> padded;   // vectors where lanes without a column follow the last column
+  // all bits, else none: where a column of the halo exists, and which lanes of the vector that it
+  // continues it holds
+  AlignedArray<T> halo_exists, halo_folds;  // (2 kHalo x lanes)
 };
 
-// A lattice sheet in motion: for every row its planes, one after the other.
+// A lattice sheet in motion. Of every vector, its planes one after the other: those that neighbours
+// see, with a halo, and those of its own.
 template <class T>
 class SweepState {
  public:
   enum Plane {
-    kX = 0,        // position, m
-    kD = 3,        // displacement of the last step, m
-    kW = 6,        // 3 d - d_previous: velocity x 2 dt, m
-    kXError = 9,   // what rounding has added to x, m
-    kDError = 12,  // what rounding has added to d, m
-    kStep2 = 15,   // dt^2 / mass, s^2/kg; 0 holds a particle
-    kPlanes = 16
+    kX = 0,  // position, m
+    kW = 3,  // 3 d - d_previous: velocity x 2 dt, m
+    kSeen = 6,
+    kD = kSeen,    // displacement of the last step, m
+    kStep2 = 9,    // dt^2 / mass, s^2/kg; 0 holds a particle
+    kXError = 10,  // what rounding has added to x, m; with compensation only, as the next one
+    kDError = 13,  // what rounding has added to d, m
   };
 
-  explicit SweepState(const RowLayout& layout);
-  // Column 0 of a plane in a row.
-  T* row(int plane, int r) { return values_.data() + place(plane, r); }
-  const T* row(int plane, int r) const { return values_.data() + place(plane, r); }
+  SweepState(const LatticeLayout<T>& layout, bool compensated);
+
+  int planes() const { return planes_; }
+  // Values from one vector of a row to the next.
+  static constexpr std::ptrdiff_t kSeenStride = kSeen * LatticeLayout<T>::kLanes;
+  std::ptrdiff_t own_stride() const { return (planes_ - kSeen) * LatticeLayout<T>::kLanes; }
+  // Vector 0 of a row.
+  T* seen(int r) { return seen_.data() + kMargin + r * seen_row(); }
+  T* own(int r) { return own_.data() + r * own_row(); }
+
+  T& at(int plane, int r, int c) {
+    T* const vector = plane < kSeen ? seen(r) + layout_.vector(c) * kSeenStride
+                                    : own(r) + layout_.vector(c) * own_stride() - kSeenStride;
+    return vector[plane * LatticeLayout<T>::kLanes + layout_.lane(c)];
+  }
+  const T& at(int plane, int r, int c) const {
+    return const_cast<SweepState*>(this)->at(plane, r, c);
+  }
 
  private:
-  std::ptrdiff_t place(int plane, int r) const {
-    return RowLayout::kLanes + (r * kPlanes + plane) * stride_;
+  static constexpr std::ptrdiff_t kMargin = (LatticeLayout<T>::kHalo + 1) * kSeenStride;
+  std::ptrdiff_t seen_row() const {
+    return (layout_.vectors() + 2 * LatticeLayout<T>::kHalo) * kSeenStride;
   }
-  std::ptrdiff_t stride_;
-  AlignedArray<T> values_;
+  std::ptrdiff_t own_row() const { return layout_.vectors() * own_stride(); }
+
+  LatticeLayout<T> layout_;
+  int planes_;
+  AlignedArray<T> seen_, own_;
 };
 
 // One substep of eq. 2 to 8 over the whole lattice, in one sweep over its rows: every connection

@@ -1,0 +1,201 @@
+// Forces of connections on vectors of them; included once for every target.
+#if defined(WEFT_LATTICE_VECTORS_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef WEFT_LATTICE_VECTORS_INL_H
+#undef WEFT_LATTICE_VECTORS_INL_H
+#else
+#define WEFT_LATTICE_VECTORS_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include "core/motion/lattice_sweep.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace weft::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+template <class V>
+struct Triple {
+  V x, y, z;
+};
+template <class V>
+HWY_INLINE Triple<V> minus(const Triple<V>& a, const Triple<V>& b) {
+  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+template <class V>
+HWY_INLINE Triple<V> plus(const Triple<V>& a, const Triple<V>& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+template <class V>
+HWY_INLINE Triple<V> times(const Triple<V>& a, V s) {
+  return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)};
+}
+// b + a s
+template <class V>
+HWY_INLINE Triple<V> plus_times(const Triple<V>& b, const Triple<V>& a, V s) {
+  return {hn::MulAdd(a.x, s, b.x), hn::MulAdd(a.y, s, b.y), hn::MulAdd(a.z, s, b.z)};
+}
+// b - a s
+template <class V>
+HWY_INLINE Triple<V> minus_times(const Triple<V>& b, const Triple<V>& a, V s) {
+  return {hn::NegMulAdd(a.x, s, b.x), hn::NegMulAdd(a.y, s, b.y), hn::NegMulAdd(a.z, s, b.z)};
+}
+template <class V>
+HWY_INLINE V squared(const Triple<V>& a) {
+  return hn::MulAdd(a.z, a.z, hn::MulAdd(a.y, a.y, hn::Mul(a.x, a.x)));
+}
+
+// Of N connections that are evaluated side by side: their long chains of operations then fill the
+// processor.
+template <class A, std::size_t N>
+using Each = std::array<A, N>;
+
+template <class F, std::size_t... k, class... A>
+HWY_INLINE auto each_of(const F& f, std::index_sequence<k...>, const A&... a) {
+  const auto at = [&](auto i) HWY_ATTR { return f(a[i]...); };
+  return std::array{at(std::integral_constant<std::size_t, k>())...};
+}
+template <class F, class A, std::size_t N, class... B>
+HWY_INLINE auto each(const F& f, const Each<A, N>& a, const B&... b) {
+  return each_of(f, std::make_index_sequence<N>(), a, b...);
+}
+
+// 1 / sqrt(v) from an integer start, unlike the processors' own approximations with equal bits
+// everywhere. Finite at 0. First a Newton step with constants fitted to the start (J. Kadlec),
+// right to 6.5e-4, then one of third order, in double another one of second.
+template <class D, std::size_t N, class V = hn::Vec<D>>
+HWY_INLINE Each<V, N> inverse_sqrt(D d, const Each<V, N>& v) {
+  using T = hn::TFromD<D>;
+  const hn::RebindToUnsigned<D> du;
+  using U = hn::TFromD<decltype(du)>;
+  constexpr bool kSingle = sizeof(T) == 4;
+  constexpr double kScale = 0.703952253, kFirst = 2.38924456;
+  const auto set = [&](double value) HWY_ATTR { return hn::Set(d, static_cast<T>(value)); };
+  const auto magic = hn::Set(du, static_cast<U>(kSingle ? 0x5f1ffff9u : 0x5fe3ffff20000000u));
+  const auto mul = [](V a, V b) HWY_ATTR { return hn::Mul(a, b); };
+
+  const auto start = each(
+      [&](V a) HWY_ATTR {
+        return hn::BitCast(d, hn::Sub(magic, hn::ShiftRight<1>(hn::BitCast(du, a))));
+      },
+      v);
+  const V first = set(kFirst);
+  auto vy = each(mul, v, start);
+  auto h = each([&](V a, V y) HWY_ATTR { return hn::NegMulAdd(a, y, first); }, vy, start);
+  auto y = each(mul, start, h);  // kScale y is near 1 / sqrt(v)
+
+  const V one = set(1 / (kScale * kScale));
+  const V linear = set(kScale * kScale * kScale / 2);
+  const V square = set(kScale * kScale * kScale * kScale * kScale * 3 / 8);
+  const V constant = set(kScale);
+  vy = each(mul, v, y);
+  h = each([&](V a, V b) HWY_ATTR { return hn::NegMulAdd(a, b, one); }, vy, y);
+  auto p = each([&](V a) HWY_ATTR { return hn::MulAdd(a, square, linear); }, h);
+  p = each([&](V a, V b) HWY_ATTR { return hn::MulAdd(a, b, constant); }, h, p);
+  y = each(mul, y, p);
+  if constexpr (!kSingle) {
+    vy = each(mul, v, y);
+    h = each([&](V a, V b) HWY_ATTR { return hn::NegMulAdd(a, b, set(1)); }, vy, y);
+    p = each([&](V a) HWY_ATTR { return hn::Mul(a, set(0.5)); }, y);
+    y = each([](V a, V b, V c) HWY_ATTR { return hn::MulAdd(a, b, c); }, p, h, y);
+  }
+  return y;
+}
+
+// k (1 - L / l) where positive, N/m (eq. 2); y = 1 / l. NaN stays NaN, so that it is found.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V stretch(D d, const StretchLaw<hn::TFromD<D>>& law, V y) {
+  return hn::Max(hn::Zero(d), hn::NegMulAdd(hn::Set(d, law.rest), y, hn::Set(d, law.stiffness)));
+}
+
+// table[i]: loads one by one, for gathers are slower.
+template <class D, class I, class V = hn::Vec<D>>
+HWY_INLINE V look_up(D d, const hn::TFromD<D>* table, I i) {
+  using T = hn::TFromD<D>;
+  const hn::RebindToSigned<D> di;
+  HWY_ALIGN hn::TFromD<decltype(di)> at[hn::MaxLanes(D())];
+  HWY_ALIGN T values[hn::MaxLanes(D())];
+  hn::Store(i, di, at);
+  for (std::size_t k = 0; k < hn::Lanes(d); ++k) values[k] = table[at[k]];
+  return hn::Load(d, values);
+}
+
+// intercept / l + slope of the segment that `at` lies in. A table of 32 repeats itself: a length
+// beyond it pulls at nothing. Where registers hold it, it is looked up there.
+template <BendKind kKind, class D, class V = hn::Vec<D>>
+HWY_INLINE V line(D d, const BendLaw<hn::TFromD<D>>& law, V at, V y) {
+  using T = hn::TFromD<D>;
+  const T* const a = law.intercepts.data();
+  const T* const b = law.slopes.data();
+#if HWY_TARGET == HWY_AVX3
+  if constexpr (kKind == BendKind::kTable32 && sizeof(T) == 4) {
+    const __m512i i = _mm512_cvttps_epi32(at.raw);
+    const auto pick = [&](const T* table) HWY_ATTR {
+      return V{_mm512_permutex2var_ps(hn::Load(d, table).raw, i, hn::Load(d, table + 16).raw)};
+    };
+    return hn::MulAdd(pick(a), y, pick(b));
+  }
+  if constexpr (kKind == BendKind::kTable32 && sizeof(T) == 8) {
+    const __m512i i = _mm512_cvttpd_epi64(at.raw);
+    const __mmask8 upper = _mm512_test_epi64_mask(i, _mm512_set1_epi64(16));
+    const auto pick = [&](const T* table) HWY_ATTR {
+      const auto half = [&](const T* from) HWY_ATTR {
+        return _mm512_permutex2var_pd(hn::Load(d, from).raw, i, hn::Load(d, from + 8).raw);
+      };
+      return V{_mm512_mask_blend_pd(upper, half(table), half(table + 16))};
+    };
+    return hn::MulAdd(pick(a), y, pick(b));
+  }
+#endif
+#if HWY_TARGET == HWY_AVX2
+  if constexpr (kKind == BendKind::kTable32 && sizeof(T) == 4) {
+    const __m256i i = _mm256_cvttps_epi32(at.raw);
+    const __m256 bit3 = _mm256_castsi256_ps(_mm256_slli_epi32(i, 28));
+    const __m256 bit4 = _mm256_castsi256_ps(_mm256_slli_epi32(i, 27));
+    const auto pick = [&](const T* table) HWY_ATTR {
+      const auto eighth = [&](int k) HWY_ATTR {
+        return _mm256_permutevar8x32_ps(hn::Load(d, table + 8 * k).raw, i);
+      };
+      const __m256 low = _mm256_blendv_ps(eighth(0), eighth(1), bit3);
+      const __m256 high = _mm256_blendv_ps(eighth(2), eighth(3), bit3);
+      return V{_mm256_blendv_ps(low, high, bit4)};
+    };
+    return hn::MulAdd(pick(a), y, pick(b));
+  }
+#endif
+  const hn::RebindToSigned<D> di;
+  auto i = hn::Zero(di);
+  if constexpr (kKind == BendKind::kTable32) {
+    i = hn::And(hn::ConvertTo(di, at), hn::Set(di, 31));
+  } else {
+    const V last = hn::Set(d, law.last);
+    i = hn::ConvertTo(di, hn::IfThenElse(hn::Lt(at, last), at, last));  // NaN: the last
+  }
+  return hn::MulAdd(look_up(d, a, i), y, look_up(d, b, i));
+}
+
+// max(f_b, c_b (l - L)) / l where negative, N/m (eq. 3 to 5); y = 1 / l.
+template <BendKind kKind, class D, class V = hn::Vec<D>>
+HWY_INLINE V bend(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V l2, V y) {
+  using T = hn::TFromD<D>;
+  const V at = hn::Mul(hn::Mul(l2, y), hn::Set(d, law.to_index));
+  V f = hn::Zero(d);
+  if constexpr (kKind == BendKind::kPolynomial) {
+    const V t = hn::Sub(at, hn::Set(d, T(1)));
+    f = hn::Set(d, law.intercepts.data()[0]);
+    for (int k = 1; k < terms; ++k) f = hn::MulAdd(f, t, hn::Set(d, law.intercepts.data()[k]));
+    f = hn::Mul(f, y);
+  } else {
+    f = line<kKind>(d, law, at, y);
+  }
+  const V clamp = hn::NegMulAdd(hn::Set(d, law.clamp_rest), y, hn::Set(d, law.clamp));
+  return hn::Min(hn::Zero(d), hn::Max(f, clamp));
+}
+
+}  // namespace weft::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

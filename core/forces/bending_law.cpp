@@ -66,18 +66,8 @@ double ExactBending::integral(double r) const { return 2 * squared_half_angle(1 
 double SeriesBending::value(double r) const {
   if (r > 1 - 1e-8) return -12;  // 0/0 in the closed form
   const double x2 = 1 - r;
-  constexpr std::array<double, 10> coefficients = {910588298588385889.0 / 228420612259840000000.0,
-                                                   6670995251837391.0 / 1165411287040000000.0,
-                                                   14328608561991.0 / 1707689984000000.0,
-                                                   317184685563.0 / 25113088000000.0,
-                                                   1766784699.0 / 89689600000.0,
-                                                   445617.0 / 13798400.0,
-                                                   3197.0 / 56000.0,
-                                                   321.0 / 2800.0,
-                                                   3.0 / 10.0,
-                                                   2.0};
   double f = 0;
-  for (const double coefficient : coefficients) f = f * x2 + coefficient;
+  for (const double coefficient : kCoefficients) f = f * x2 + coefficient;
   const double u = std::sqrt(1.5 * x2) * f;
   return 4 * u * u / (std::cos(u) - r);
 }

@@ -26,6 +26,19 @@ class SeriesBending {
  public:
   double value(double r) const;
   double integral(double r) const;
+
+  // Of powers of 1 - r, highest first.
+  static constexpr std::array<double, 10> kCoefficients = {
+      910588298588385889.0 / 228420612259840000000.0,
+      6670995251837391.0 / 1165411287040000000.0,
+      14328608561991.0 / 1707689984000000.0,
+      317184685563.0 / 25113088000000.0,
+      1766784699.0 / 89689600000.0,
+      445617.0 / 13798400.0,
+      3197.0 / 56000.0,
+      321.0 / 2800.0,
+      3.0 / 10.0,
+      2.0};
 };
 
 // Equal line segments over [0, 1], the paper's contribution. Between the nodes |g| is

@@ -178,20 +178,25 @@ HWY_INLINE V line(D d, const BendLaw<hn::TFromD<D>>& law, V at, V y) {
   return hn::MulAdd(look_up(d, a, i), y, look_up(d, b, i));
 }
 
+// The polynomial, `at` = 2 l / L.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V polynomial(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V at) {
+  const auto* const coefficients = law.intercepts.data();
+  const V t = hn::Sub(at, hn::Set(d, 1));
+  V f = hn::Set(d, coefficients[0]);
+  for (int k = 1; k < terms; ++k) f = hn::MulAdd(f, t, hn::Set(d, coefficients[k]));
+  return f;
+}
+
 // max(f_b, c_b (l - L)) / l where negative, N/m (eq. 3 to 5); y = 1 / l.
 template <BendKind kKind, class D, class V = hn::Vec<D>>
 HWY_INLINE V bend(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V l2, V y) {
-  using T = hn::TFromD<D>;
   const V at = hn::Mul(hn::Mul(l2, y), hn::Set(d, law.to_index));
   V f = hn::Zero(d);
-  if constexpr (kKind == BendKind::kPolynomial) {
-    const V t = hn::Sub(at, hn::Set(d, T(1)));
-    f = hn::Set(d, law.intercepts.data()[0]);
-    for (int k = 1; k < terms; ++k) f = hn::MulAdd(f, t, hn::Set(d, law.intercepts.data()[k]));
-    f = hn::Mul(f, y);
-  } else {
+  if constexpr (kKind == BendKind::kPolynomial)
+    f = hn::Mul(polynomial(d, law, terms, at), y);
+  else
     f = line<kKind>(d, law, at, y);
-  }
   const V clamp = hn::NegMulAdd(hn::Set(d, law.clamp_rest), y, hn::Set(d, law.clamp));
   return hn::Min(hn::Zero(d), hn::Max(f, clamp));
 }

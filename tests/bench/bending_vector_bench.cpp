@@ -1,0 +1,153 @@
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/forces/bending_law.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "tests/bench/bending_vector_bench.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "core/motion/lattice_vectors-inl.h"
+#include "hwy/contrib/math/math-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace weft::HWY_NAMESPACE {
+
+using D = hn::ScalableTag<float>;
+using V = hn::Vec<D>;
+
+template <class F>
+void map(const float* r, float* g, std::size_t n, const F& f) {
+  const D d;
+  for (std::size_t i = 0; i < n; i += hn::Lanes(d)) hn::Store(f(hn::Load(d, r + i)), d, g + i);
+}
+
+// The kernels' own lookups: slope and intercept change places, for they give f / l.
+template <BendKind kKind>
+void segments(const BendLaw<float>& law, int, const float* r, float* g, std::size_t n) {
+  const D d;
+  map(r, g, n,
+      [&](V v) HWY_ATTR { return line<kKind>(d, law, hn::Mul(v, hn::Set(d, law.to_index)), v); });
+}
+void chebyshev(const BendLaw<float>& law, int terms, const float* r, float* g, std::size_t n) {
+  const D d;
+  map(r, g, n, [&](V v) HWY_ATTR {
+    return polynomial(d, law, terms, hn::Mul(v, hn::Set(d, law.to_index)));
+  });
+}
+// Eq. 6 in vectors, Horner in 1 - r; law.intercepts: the series' coefficients, highest first.
+void series(const BendLaw<float>& law, int terms, const float* r, float* g, std::size_t n) {
+  const D d;
+  map(r, g, n, [&](V v) HWY_ATTR {
+    const V x2 = hn::Sub(hn::Set(d, 1.0f), v);
+    V f = hn::Zero(d);
+    for (int k = 0; k < terms; ++k) f = hn::MulAdd(f, x2, hn::Set(d, law.intercepts.data()[k]));
+    const V u = hn::Mul(hn::Sqrt(hn::Mul(hn::Set(d, 1.5f), x2)), f);
+    return hn::Div(hn::Mul(hn::Set(d, 4.0f), hn::Mul(u, u)), hn::Sub(hn::Cos(d, u), v));
+  });
+}
+void segments32(const BendLaw<float>& law, int terms, const float* r, float* g, std::size_t n) {
+  segments<BendKind::kTable32>(law, terms, r, g, n);
+}
+void segments_more(const BendLaw<float>& law, int terms, const float* r, float* g, std::size_t n) {
+  segments<BendKind::kTable>(law, terms, r, g, n);
+}
+
+}  // namespace weft::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace weft {
+
+HWY_EXPORT(segments32);
+HWY_EXPORT(segments_more);
+HWY_EXPORT(chebyshev);
+HWY_EXPORT(series);
+
+namespace {
+
+using Function = void (*)(const BendLaw<float>&, int, const float*, float*, std::size_t);
+
+constexpr std::size_t kCount = 4096;
+
+// Time of one g(r) in vectors, with the largest relative error beside it; r spread evenly over
+// [0, 1 - 1e-3), in no order: nearer the flat sheet the series is 0 / 0 in single precision.
+template <class Dispatch>
+void evaluate(benchmark::State& state, const Dispatch& dispatch, const BendLaw<float>& law,
+              int terms) {
+  AlignedArray<float> r(kCount), g(kCount);
+  std::mt19937_64 random(1);
+  for (std::size_t i = 0; i < kCount; ++i)
+    r.data()[i] = 0.999f * static_cast<float>(random() >> 40) * 0x1p-24f;
+  const auto run = [&] { dispatch()(law, terms, r.data(), g.data(), kCount); };
+  run();  // picks the target
+  for (auto _ : state) {
+    run();
+    benchmark::ClobberMemory();
+  }
+  double largest = 0;
+  const ExactBending exact;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const double true_value = exact.value(double{r.data()[i]});
+    largest = std::max(largest, std::abs(double{g.data()[i]} / true_value - 1));
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kCount));
+  state.counters["error"] = largest;
+}
+
+template <class Dispatch>
+void add(const std::string& name, const Dispatch& dispatch, const std::vector<double>& intercepts,
+         const std::vector<double>& slopes, double to_index) {
+  benchmark::RegisterBenchmark(("bending/" + name).c_str(), [=](benchmark::State& state) {
+    BendLaw<float> law;
+    const auto fill = [](const std::vector<double>& from, AlignedArray<float>& to) {
+      to = AlignedArray<float>(std::max<std::size_t>(32, from.size()));
+      std::transform(from.begin(), from.end(), to.data(),
+                     [](double value) { return static_cast<float>(value); });
+    };
+    fill(intercepts, law.intercepts);
+    fill(slopes, law.slopes);
+    law.to_index = static_cast<float>(to_index);
+    law.last = static_cast<float>(intercepts.size() - 1);
+    evaluate(state, dispatch, law, static_cast<int>(intercepts.size()));
+  });
+}
+
+const bool added = [] {
+  for (const int n : {2, 5, 16, 32, 60, 256, 1024}) {
+    std::vector<double> intercepts, slopes;
+    const LinearizedBending linearized(n);
+    for (const auto& segment : linearized.segments()) {
+      intercepts.push_back(segment.intercept);
+      slopes.push_back(segment.slope);
+    }
+    add(
+        "LINEARIZED/" + std::to_string(n),
+        [n]() -> Function {
+          if (n <= 32) return HWY_DYNAMIC_DISPATCH(segments32);
+          return HWY_DYNAMIC_DISPATCH(segments_more);
+        },
+        slopes, intercepts, n);
+  }
+  for (const int degree : {5, 7, 10})
+    add(
+        "POLYNOMIAL/" + std::to_string(degree),
+        []() -> Function { return HWY_DYNAMIC_DISPATCH(chebyshev); },
+        PolynomialBending(degree).coefficients(), {}, 2);
+  const auto& terms = SeriesBending::kCoefficients;
+  add(
+      "SERIES", []() -> Function { return HWY_DYNAMIC_DISPATCH(series); },
+      {terms.begin(), terms.end()}, {}, 1);
+  return true;
+}();
+
+}  // namespace
+}  // namespace weft
+#endif

@@ -23,7 +23,7 @@ With --json every answer is one JSON document (watch: one a line), on stderr {"e
 
 Exit codes:
   0    done
-  1    refused by the server, or not to be had
+  1    refused by the server, not to be had, or not as expected
   2    wrong command line
   3    no connection to the server
   4    a file cannot be read or written, or is damaged
@@ -70,6 +70,8 @@ void add_commands(CLI::App& app, Context& context) {
   add_watch(app, context);
   add_record(app, context);
   add_info(app, context);
+  add_verify(app, context);
+  add_diff(app, context);
   add_export(app, context);
   add_demo(app, context);
 }

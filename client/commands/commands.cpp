@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <google/protobuf/util/time_util.h>
 
+#include <algorithm>
+
 #include "client/output/text.h"
 
 namespace weft::client {
@@ -17,6 +19,14 @@ std::string sheets_text(const v1::Scene& scene) {
                     sheet.grid().columns(), sheet.grid().spacing_m() * 1e3);
   }
   return text;
+}
+
+std::int64_t read_frame_number(const std::string& text, const std::string& range) {
+  if (text.empty() || text.size() > 18 ||
+      text.find_first_not_of("0123456789") != std::string::npos) {
+    throw usage_problem("--frames " + range + ": write A:B, A: or :B");
+  }
+  return std::stoll(text);
 }
 
 }  // namespace
@@ -39,6 +49,17 @@ void add_session_or_scene_argument(CLI::App& command, std::string& given) {
   command.add_option("SESSION", given, "Name of the session (with --embedded: a scene file)")
       ->option_text(" ")
       ->required();
+}
+
+FrameRange read_frame_range(const std::string& text) {
+  FrameRange range;
+  if (text.empty()) return range;
+  const std::size_t colon = std::min(text.find(':'), text.size());
+  const std::string first = text.substr(0, colon);
+  const std::string last = colon < text.size() ? text.substr(colon + 1) : first;
+  if (!first.empty() || last.empty()) range.first = read_frame_number(first, text);
+  if (!last.empty()) range.last = read_frame_number(last, text);
+  return range;
 }
 
 std::string state_text(v1::SessionState state) {

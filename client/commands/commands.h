@@ -4,6 +4,7 @@
 #include <string>
 
 #include "client/context.h"
+#include "client/recording/frame_range.h"
 
 namespace weft::client {
 
@@ -17,6 +18,8 @@ void add_step(CLI::App& app, Context& context);
 void add_watch(CLI::App& app, Context& context);
 void add_record(CLI::App& app, Context& context);
 void add_info(CLI::App& app, Context& context);
+void add_verify(CLI::App& app, Context& context);
+void add_diff(CLI::App& app, Context& context);
 void add_export(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
 
@@ -29,6 +32,9 @@ CLI::App* add_group(CLI::App& app, const char* name, const char* description);
 // The positional SESSION.
 void add_session_argument(CLI::App& command, std::string& session);
 void add_session_or_scene_argument(CLI::App& command, std::string& given);
+
+// "A:B", both included; either may be left out, and an empty text is all frames.
+FrameRange read_frame_range(const std::string& text);
 
 // "paused"
 std::string state_text(v1::SessionState state);

@@ -58,7 +58,7 @@ void export_run(const Run& run) {
   export_recording(recording, order, ignore);
   order.format = ExportFormat::kObj;
   order.path = run.path + "-end";
-  order.first_frame = run.tally.last_frame;
+  order.frames.first = run.tally.last_frame;
   export_recording(recording, order, ignore);
 }
 

@@ -15,26 +15,9 @@ struct Options {
   ExportOrder order;
 };
 
-std::int64_t read_frame_number(const std::string& text, const std::string& range) {
-  if (text.empty() || text.size() > 18 ||
-      text.find_first_not_of("0123456789") != std::string::npos) {
-    throw usage_problem("--frames " + range + ": write A:B, A: or :B");
-  }
-  return std::stoll(text);
-}
-
-// "A:B", both included; either may be left out.
-void read_range(const std::string& range, ExportOrder& order) {
-  const std::size_t colon = std::min(range.find(':'), range.size());
-  const std::string first = range.substr(0, colon);
-  const std::string last = colon < range.size() ? range.substr(colon + 1) : first;
-  if (!first.empty() || last.empty()) order.first_frame = read_frame_number(first, range);
-  if (!last.empty()) order.last_frame = read_frame_number(last, range);
-}
-
 void run(Context& context, const Options& options) {
   ExportOrder order = options.order;
-  if (!options.frames.empty()) read_range(options.frames, order);
+  order.frames = read_frame_range(options.frames);
   RecordingReader recording(options.recording);
   Status status(context.terminal.err, context.terminal.err_is_watched);
   const ExportResult result = export_recording(recording, order, [&](const ExportResult& so_far) {

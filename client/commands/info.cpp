@@ -5,35 +5,10 @@
 #include "client/commands/commands.h"
 #include "client/output/status.h"
 #include "client/output/text.h"
-#include "client/recording/reader.h"
-#include "client/recording/tally.h"
+#include "client/recording/inspection.h"
 
 namespace weft::client {
 namespace {
-
-struct Findings {
-  Tally tally;
-  std::vector<Violation> damage;
-};
-
-// Reads every frame; each that cannot be read, or is not there, is damage.
-Findings examine(RecordingReader& recording, Status& status) {
-  Findings findings;
-  for (const auto& text : recording.find_damage()) findings.damage.push_back({"file", text});
-  std::int64_t expected = recording.header().start_frame();
-  while (const auto number = recording.find_from(expected)) {
-    if (*number != expected)
-      findings.damage.push_back({fmt::format("frame {}", expected), "missing"});
-    try {
-      findings.tally.add(recording.read(*number));
-    } catch (const Problem& problem) {
-      findings.damage.push_back({fmt::format("frame {}", *number), problem.what()});
-    }
-    expected = *number + 1;
-    status.show({fmt::format("checking frame {}", *number)});
-  }
-  return findings;
-}
 
 std::string sheets_text(const v1::StreamHeader& header) {
   std::string text;
@@ -44,9 +19,9 @@ std::string sheets_text(const v1::StreamHeader& header) {
   return text;
 }
 
-std::string facts_text(const RecordingReader& recording, const Findings& findings) {
+std::string facts_text(const RecordingReader& recording, const Inspection& inspection) {
   const v1::StreamHeader& header = recording.header();
-  const Tally& tally = findings.tally;
+  const Tally& tally = inspection.tally;
   const bool doubles = header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
   Facts facts;
   facts.add("recording", recording.path())
@@ -75,14 +50,15 @@ std::string facts_text(const RecordingReader& recording, const Findings& finding
   facts
       .add("file size",
            bytes_text(static_cast<std::int64_t>(std::filesystem::file_size(recording.path()))))
-      .add("checksums", findings.damage.empty()
-                            ? "all right"
-                            : count_of(static_cast<std::int64_t>(findings.damage.size()), "fault"));
+      .add("checksums",
+           inspection.faults.empty()
+               ? "all right"
+               : count_of(static_cast<std::int64_t>(inspection.faults.size()), "fault"));
   return facts.text();
 }
 
-Json facts_json(const RecordingReader& recording, const Findings& findings) {
-  const Tally& tally = findings.tally;
+Json facts_json(const RecordingReader& recording, const Inspection& inspection) {
+  const Tally& tally = inspection.tally;
   return {{"file", recording.path()},
           {"bytes", std::filesystem::file_size(recording.path())},
           {"recorded_at", recording.recorded_at()},
@@ -95,21 +71,18 @@ Json facts_json(const RecordingReader& recording, const Findings& findings) {
           {"substeps", tally.substeps},
           {"largest_strain", tally.largest_strain},
           {"last_stats", to_json(tally.last_stats)},
-          {"faults", findings.damage.size()}};
+          {"faults", inspection.faults.size()}};
 }
 
 void run(Context& context, const std::string& path) {
   RecordingReader recording(path);
   Status status(context.terminal.err, context.terminal.err_is_watched);
-  const Findings findings = examine(recording, status);
+  const Inspection inspection = inspect(recording, [&](std::int64_t frame) {
+    status.show({fmt::format("reading frame {}", frame)});
+  });
   status.clear();
-  context.answer(facts_json(recording, findings), facts_text(recording, findings));
-  if (!findings.damage.empty()) {
-    Problem problem =
-        damaged(path, count_of(static_cast<std::int64_t>(findings.damage.size()), "fault"));
-    problem.violations = findings.damage;
-    throw problem;
-  }
+  context.answer(facts_json(recording, inspection), facts_text(recording, inspection));
+  check(recording, inspection);
 }
 
 }  // namespace

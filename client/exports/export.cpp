@@ -2,10 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
-#include <deque>
 #include <filesystem>
-#include <optional>
 
 #include "client/exports/frame_writer.h"
 #include "client/problem.h"
@@ -57,35 +56,15 @@ std::int64_t find_frame_at(RecordingReader& recording, double time_s) {
                             time_s, neighbours.empty() ? "nothing" : neighbours));
 }
 
-// Hands out the numbers of the frames that are exported.
-class FrameNumbers {
- public:
-  FrameNumbers(RecordingReader& recording, const ExportOrder& order)
-      : recording_(recording), next_(order.first_frame), last_(order.last_frame) {
-    for (const double time : order.times_s) at_times_.push_back(find_frame_at(recording, time));
-    by_time_ = !at_times_.empty();
-  }
-
-  std::optional<std::int64_t> next() {
-    std::optional<std::int64_t> number;
-    if (!by_time_) {
-      number = recording_.find_from(next_);
-    } else if (!at_times_.empty()) {
-      number = at_times_.front();
-      at_times_.pop_front();
-    }
-    if (!number || *number > last_) return std::nullopt;
-    next_ = *number + 1;
-    return number;
-  }
-
- private:
-  RecordingReader& recording_;
-  std::int64_t next_;
-  std::int64_t last_;
-  bool by_time_ = false;
-  std::deque<std::int64_t> at_times_;
-};
+std::vector<std::int64_t> frames_to_export(RecordingReader& recording, const ExportOrder& order) {
+  std::vector<std::int64_t> numbers;
+  for (const double time : order.times_s) numbers.push_back(find_frame_at(recording, time));
+  if (!order.times_s.empty()) return numbers;
+  const std::int64_t last = std::min(order.frames.last, recording.last_frame());
+  for (auto n = std::max(order.frames.first, recording.first_frame()); n <= last; ++n)
+    numbers.push_back(n);
+  return numbers;
+}
 
 std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& part,
                                          std::int64_t first_frame) {
@@ -105,17 +84,17 @@ std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& p
 ExportResult export_recording(RecordingReader& recording, const ExportOrder& order,
                               const std::function<void(const ExportResult&)>& progress) {
   const Part part = find_part(recording, order.sheet);
-  FrameNumbers numbers(recording, order);
-  auto number = numbers.next();
-  if (!number) throw usage_problem(fmt::format("{} has none of these frames", recording.path()));
+  const std::vector<std::int64_t> numbers = frames_to_export(recording, order);
+  if (numbers.empty())
+    throw usage_problem(fmt::format("{} has none of these frames", recording.path()));
 
   std::error_code error;  // there is no such file yet
   if (std::filesystem::equivalent(order.path, recording.path(), error))
     throw unwritable(order.path, "it is the recording itself");
-  const auto writer = make_writer(order, part, *number);
+  const auto writer = make_writer(order, part, numbers.front());
   ExportResult result{.frames = 0, .particles = static_cast<std::int64_t>(part.count)};
-  for (; number; number = numbers.next()) {
-    const v1::Frame frame = recording.read(*number);
+  for (const std::int64_t number : numbers) {
+    const v1::Frame frame = recording.read(number);
     writer->add({.number = frame.number(),
                  .time_s = frame.time_s(),
                  .points = read_points(frame.positions_m(), recording.header().format().encoding(),

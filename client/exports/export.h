@@ -2,10 +2,10 @@
 
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <string>
 #include <vector>
 
+#include "client/recording/frame_range.h"
 #include "client/recording/reader.h"
 
 namespace weft::client {
@@ -17,8 +17,7 @@ struct ExportOrder {
   ExportFormat format = ExportFormat::kCsv;
   std::string path;
   std::string sheet;  // empty: all sheets
-  std::int64_t first_frame = 0;
-  std::int64_t last_frame = std::numeric_limits<std::int64_t>::max();
+  FrameRange frames;
   std::vector<double> times_s;  // where given, frames at these times instead
 };
 

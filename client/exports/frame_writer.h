@@ -1,12 +1,20 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "client/exports/points.h"
+#include "client/recording/points.h"
 
 namespace weft::client {
+
+// A part of a frame as an export writes it.
+struct ExportFrame {
+  std::int64_t number = 0;
+  double time_s = 0;
+  Points points;
+};
 
 // Writes frames in the format of another tool.
 class FrameWriter {

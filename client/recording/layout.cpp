@@ -8,6 +8,7 @@ namespace weft::client {
 std::int64_t checksum_of(std::initializer_list<std::string_view> parts) {
   uLong crc = 0;
   for (const std::string_view part : parts) {
+    if (part.empty()) continue;  // zlib takes a null pointer as a wish to begin anew
     crc = crc32_z(crc, reinterpret_cast<const Bytef*>(part.data()), part.size());
   }
   return static_cast<std::int64_t>(crc);

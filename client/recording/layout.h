@@ -6,9 +6,10 @@
 
 namespace weft::client {
 
-// A recording is one SQLite file: what was recorded, once, and a row for every frame.
+// A recording is one SQLite file: what was recorded, once, how far it goes, and a row for every
+// frame from the header's start_frame to there. A commit moves both together.
 inline constexpr std::int64_t kRecordingId = 0x57454654;  // "WEFT", application_id of the file
-inline constexpr std::int64_t kRecordingVersion = 1;      // user_version of the file
+inline constexpr std::int64_t kRecordingVersion = 2;      // user_version of the file
 inline constexpr const char* kRecordingTables = R"(
   CREATE TABLE recording (
     weft_version TEXT NOT NULL,
@@ -16,6 +17,9 @@ inline constexpr const char* kRecordingTables = R"(
     scene TEXT NOT NULL,          -- JSON of weft.v1.Scene
     header TEXT NOT NULL,         -- JSON of weft.v1.StreamHeader
     checksum INTEGER NOT NULL);   -- CRC-32 of the columns before
+  CREATE TABLE extent (
+    last_frame INTEGER NOT NULL,  -- start_frame - 1: there is none yet
+    checksum INTEGER NOT NULL);   -- CRC-32 of the session's uid and last_frame (8 bytes, little-endian)
   CREATE TABLE frames (
     number INTEGER PRIMARY KEY,
     time_s REAL NOT NULL,
@@ -24,6 +28,8 @@ inline constexpr const char* kRecordingTables = R"(
 )";
 
 std::int64_t checksum_of(std::initializer_list<std::string_view> parts);
-std::int64_t checksum_of_frame(std::string_view uid, std::int64_t number, std::string_view frame);
+// Of the extent: without a frame.
+std::int64_t checksum_of_frame(std::string_view uid, std::int64_t number,
+                               std::string_view frame = {});
 
 }  // namespace weft::client

@@ -14,6 +14,14 @@ std::int64_t pragma(Database& database, std::string_view name) {
   return statement.step() ? statement.integer(0) : 0;
 }
 
+std::size_t array_bytes(const v1::StreamHeader& header) {
+  std::size_t particles = 0;
+  for (const auto& sheet : header.sheets())
+    particles += static_cast<std::size_t>(sheet.rows()) * static_cast<std::size_t>(sheet.columns());
+  const bool doubles = header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
+  return 3 * particles * (doubles ? sizeof(double) : sizeof(float));
+}
+
 }  // namespace
 
 RecordingReader::RecordingReader(const std::string& path)
@@ -33,18 +41,19 @@ RecordingReader::RecordingReader(const std::string& path)
                      google::protobuf::util::JsonStringToMessage(scene, &scene_).ok() &&
                      google::protobuf::util::JsonStringToMessage(header, &header_).ok();
   if (!sound) throw damaged(path, "the checksum of its description is wrong");
-}
 
-std::optional<std::int64_t> RecordingReader::find_from(std::int64_t number) {
-  Statement row =
-      database_.prepare("SELECT number FROM frames WHERE number >= ? ORDER BY number LIMIT 1");
-  if (!row.bind(1, number).step()) return std::nullopt;
-  return row.integer(0);
+  Statement extent = database_.prepare("SELECT last_frame, checksum FROM extent");
+  if (!extent.step() || extent.integer(1) != checksum_of_frame(header_.uid(), extent.integer(0)))
+    throw damaged(path, "the checksum of its number of frames is wrong");
+  last_frame_ = extent.integer(0);
+  array_bytes_ = array_bytes(header_);
 }
 
 v1::Frame RecordingReader::read(std::int64_t number) {
   Statement row = database_.prepare("SELECT time_s, frame, checksum FROM frames WHERE number = ?");
   if (!row.bind(1, number).step()) {
+    if (number >= first_frame() && number <= last_frame_)
+      throw damaged(path_, fmt::format("frame {} is missing", number));
     throw Problem(Exit::kFile, "NOT_FOUND", "FRAME_MISSING",
                   fmt::format("{} has no frame {}", path_, number));
   }
@@ -54,6 +63,11 @@ v1::Frame RecordingReader::read(std::int64_t number) {
                      frame.ParseFromString(bytes) && frame.number() == number &&
                      frame.time_s() == row.real(0);
   if (!sound) throw damaged(path_, fmt::format("the checksum of frame {} is wrong", number));
+  const std::size_t velocity_bytes = header_.format().velocities() ? array_bytes_ : 0;
+  if (frame.positions_m().size() != array_bytes_ ||
+      frame.velocities_m_per_s().size() != velocity_bytes) {
+    throw damaged(path_, fmt::format("frame {} is not as long as its header says", number));
+  }
   return frame;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,7 +10,8 @@
 
 namespace weft::client {
 
-// Reads a recording, a frame at a time; a recorder may still be writing it.
+// Reads a recording, a frame at a time. A recorder may still be writing it: the reader sees the
+// frames that were there when it was made.
 class RecordingReader {
  public:
   explicit RecordingReader(const std::string& path);
@@ -21,9 +21,11 @@ class RecordingReader {
   const v1::StreamHeader& header() const { return header_; }
   const std::string& recorded_at() const { return recorded_at_; }
 
-  // Number of the first frame not below this one.
-  std::optional<std::int64_t> find_from(std::int64_t number);
-  // The frame, checked; a frame that is damaged or not there is a Problem.
+  // It holds every frame from first_frame() to last_frame(); one less where there is none.
+  std::int64_t first_frame() const { return header_.start_frame(); }
+  std::int64_t last_frame() const { return last_frame_; }
+
+  // The frame, as it was written, its arrays as long as the header says; else a Problem.
   v1::Frame read(std::int64_t number);
   // The two frames around a time, (number, time); one at either end.
   std::vector<std::pair<std::int64_t, double>> find_around(double time_s);
@@ -36,6 +38,8 @@ class RecordingReader {
   v1::Scene scene_;
   v1::StreamHeader header_;
   std::string recorded_at_;
+  std::int64_t last_frame_ = 0;
+  std::size_t array_bytes_ = 0;  // of a frame's positions
 };
 
 }  // namespace weft::client

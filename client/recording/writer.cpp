@@ -40,6 +40,11 @@ void describe(Database& database, const v1::Scene& scene, const v1::StreamHeader
       .bind_text(4, header_json)
       .bind(5, checksum_of({WEFT_VERSION, recorded_at, scene_json, header_json}))
       .step();
+  const std::int64_t none = header.start_frame() - 1;
+  database.prepare("INSERT INTO extent VALUES (?, ?)")
+      .bind(1, none)
+      .bind(2, checksum_of_frame(header.uid(), none))
+      .step();
   database.execute("COMMIT");
 }
 
@@ -48,9 +53,11 @@ void describe(Database& database, const v1::Scene& scene, const v1::StreamHeader
 RecordingWriter::RecordingWriter(const std::string& path, bool replace, const v1::Scene& scene,
                                  const v1::StreamHeader& header)
     : uid_(header.uid()),
+      last_frame_(header.start_frame() - 1),
       database_(create(path, replace)),
       insert_((describe(database_, scene, header),
                database_.prepare("INSERT INTO frames VALUES (?, ?, ?, ?)"))),
+      extend_(database_.prepare("UPDATE extent SET last_frame = ?, checksum = ?")),
       last_commit_(Clock::now()) {}
 
 RecordingWriter::~RecordingWriter() {
@@ -70,13 +77,18 @@ void RecordingWriter::add(const v1::Frame& frame) {
       .bind(4, checksum_of_frame(uid_, frame.number(), bytes))
       .step();
   insert_.reset();
+  last_frame_ = frame.number();
 
   pending_bytes_ += bytes.size();
   if (pending_bytes_ > kCommitBytes || Clock::now() - last_commit_ > kCommitInterval) commit();
 }
 
 void RecordingWriter::commit() {
-  if (std::exchange(pending_, false)) database_.execute("COMMIT");
+  if (std::exchange(pending_, false)) {
+    extend_.bind(1, last_frame_).bind(2, checksum_of_frame(uid_, last_frame_)).step();
+    extend_.reset();
+    database_.execute("COMMIT");
+  }
   pending_bytes_ = 0;
   last_commit_ = Clock::now();
 }

@@ -28,8 +28,10 @@ class RecordingWriter {
   using Clock = std::chrono::steady_clock;
 
   std::string uid_;
+  std::int64_t last_frame_;
   Database database_;
   Statement insert_;
+  Statement extend_;
   bool pending_ = false;
   std::size_t pending_bytes_ = 0;
   Clock::time_point last_commit_;

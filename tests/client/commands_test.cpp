@@ -155,6 +155,8 @@ TEST_F(CommandsTest, EveryAnswerIsOneJsonDocumentWhenAskedFor) {
            {"run", "cloth", "--until-frame", "6", "--wait"},
            {"record", "cloth", "--from", "0", "--to", "6", "-o", path("cloth.weft")},
            {"info", path("cloth.weft")},
+           {"verify", path("cloth.weft")},
+           {"diff", path("cloth.weft"), path("cloth.weft")},
            {"export", path("cloth.weft"), "--format", "obj", "-o", path("cloth")},
            {"run", "cloth"},
            {"pause", "cloth"},

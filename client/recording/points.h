@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -13,15 +12,10 @@ struct Points {
   std::vector<double> x, y, z;
 };
 
-// A part of a frame as an export writes it.
-struct ExportFrame {
-  std::int64_t number = 0;
-  double time_s = 0;
-  Points points;
-};
-
 // The particles first, first + 1, ... of the planes of a frame.
 Points read_points(const std::string& planes, v1::FrameEncoding encoding, std::size_t first,
                    std::size_t count);
+// All of them.
+Points read_points(const std::string& planes, v1::FrameEncoding encoding);
 
 }  // namespace weft::client

@@ -1,4 +1,4 @@
-#include "client/exports/points.h"
+#include "client/recording/points.h"
 
 #include <bit>
 #include <cstring>
@@ -31,6 +31,12 @@ Points read_points(const std::string& planes, v1::FrameEncoding encoding, std::s
                    std::size_t count) {
   return encoding == v1::FRAME_ENCODING_FLOAT64 ? read_planes<double>(planes, first, count)
                                                 : read_planes<float>(planes, first, count);
+}
+
+Points read_points(const std::string& planes, v1::FrameEncoding encoding) {
+  const bool doubles = encoding == v1::FRAME_ENCODING_FLOAT64;
+  return read_points(planes, encoding, 0,
+                     planes.size() / (3 * (doubles ? sizeof(double) : sizeof(float))));
 }
 
 }  // namespace weft::client

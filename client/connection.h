@@ -29,8 +29,14 @@ class Connection {
   template <class Stub, class Request, class Response>
   Response call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                 const Request& request) {
+    return call(method, request, stop_);
+  }
+  // The same, cancelled by another stop; an empty token: by none.
+  template <class Stub, class Request, class Response>
+  Response call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                const Request& request, const std::stop_token& stop) {
     grpc::ClientContext context;
-    const std::stop_callback cancel(stop_, [&] { context.TryCancel(); });
+    const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
     Response response;
     check((std::get<std::unique_ptr<Stub>>(stubs_).get()->*method)(&context, request, &response));
     return response;

@@ -17,7 +17,7 @@ std::string Context::session_name(const std::string& session) {
 }
 
 std::string Context::session_or_scene(const std::string& given) {
-  return embedded ? create_session(connection(), given).name() : session_name(given);
+  return embedded ? create_session(connection(), read_scene(given)).name() : session_name(given);
 }
 
 void Context::answer(const Json& document, const std::string& text) {

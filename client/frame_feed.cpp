@@ -22,7 +22,14 @@ void wait(std::chrono::milliseconds time, const std::stop_token& stop) {
 
 FrameFeed::FrameFeed(Connection& connection, v1::StreamFramesRequest request,
                      std::chrono::seconds patience)
-    : connection_(connection), request_(std::move(request)), patience_(patience) {
+    : FrameFeed(connection, std::move(request), patience, connection.stop()) {}
+
+FrameFeed::FrameFeed(Connection& connection, v1::StreamFramesRequest request,
+                     std::chrono::seconds patience, std::stop_token stop)
+    : connection_(connection),
+      request_(std::move(request)),
+      patience_(patience),
+      stop_(std::move(stop)) {
   open();
 }
 
@@ -41,7 +48,7 @@ std::optional<v1::StreamFramesResponse> FrameFeed::next() {
     const grpc::Status status = reader_->Finish();
     const bool complete = header_seen_ && request_.has_end_frame() && request_.has_start_frame() &&
                           request_.start_frame() > request_.end_frame();
-    if (status.ok() || complete || connection_.stop().stop_requested()) return std::nullopt;
+    if (status.ok() || complete || stop_.stop_requested()) return std::nullopt;
     open_again(status);
   }
 }
@@ -50,7 +57,7 @@ void FrameFeed::open() {
   cancel_.reset();
   reader_.reset();
   context_ = std::make_unique<grpc::ClientContext>();
-  cancel_.emplace(connection_.stop(), [context = context_.get()] { context->TryCancel(); });
+  cancel_.emplace(stop_, [context = context_.get()] { context->TryCancel(); });
   reader_ = connection_.frames().StreamFrames(context_.get(), request_);
 }
 
@@ -78,7 +85,7 @@ void FrameFeed::open_again(const grpc::Status& status) {
   const bool hopeless =
       came_from_weftd(status) || !header_seen_ || Clock::now() - last_heard_ > patience_;
   if (hopeless) connection_.check(status);
-  wait(pause_, connection_.stop());
+  wait(pause_, stop_);
   pause_ = std::min(2 * pause_, kLongestPause);
   ++reconnections_;
   open();

@@ -16,6 +16,9 @@ class FrameFeed {
  public:
   // Gives up when nothing was heard for the patience given.
   FrameFeed(Connection& connection, v1::StreamFramesRequest request, std::chrono::seconds patience);
+  // With a stop of its own instead of the connection's.
+  FrameFeed(Connection& connection, v1::StreamFramesRequest request, std::chrono::seconds patience,
+            std::stop_token stop);
   ~FrameFeed();
   FrameFeed(const FrameFeed&) = delete;
   FrameFeed& operator=(const FrameFeed&) = delete;
@@ -36,6 +39,7 @@ class FrameFeed {
   Connection& connection_;
   v1::StreamFramesRequest request_;
   std::chrono::seconds patience_;
+  std::stop_token stop_;
   bool header_seen_ = false;
   int reconnections_ = 0;
   Clock::time_point last_heard_;

@@ -4,28 +4,14 @@
 #include <google/protobuf/util/json_util.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <tuple>
 
+#include "client/input_file.h"
 #include "client/output/json.h"
 #include "client/problem.h"
 
 namespace weft::client {
 namespace {
-
-std::string read_text(const std::string& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  if (!file.is_open() || std::filesystem::is_directory(path)) {
-    throw unreadable(path, std::strerror(file.is_open() ? EISDIR : errno));
-  }
-  return text.str();
-}
 
 // "line 3, column 7: ..." of the JSON parser's "[json...] parse error at line 3, column 7: ..."
 void check_syntax(const std::string& path, const std::string& text) {
@@ -75,15 +61,15 @@ v1::Scene read_scene(const std::string& path) {
   throw malformed(path + line_of(word, text), "no such field: " + place);
 }
 
-v1::Session create_session(Connection& connection, const std::string& path,
+v1::Session create_session(Connection& connection, const v1::Scene& scene,
                            v1::CreateSessionRequest request) try {
-  *request.mutable_session()->mutable_scene() = read_scene(path);
+  *request.mutable_session()->mutable_scene() = scene;
   return connection.call(&v1::SessionService::Stub::CreateSession, request);
 } catch (const Problem& problem) {
   if (problem.code == "RESOURCE_EXHAUSTED" && problem.reason.empty()) {  // of gRPC itself
     throw Problem(problem.exit, problem.code, "REQUEST_TOO_LARGE",
-                  fmt::format("{}: {} bytes are more than a request may have ({})", path,
-                              request.ByteSizeLong(), problem.what()));
+                  fmt::format("the scene's {} bytes are more than a request may have ({})",
+                              scene.ByteSizeLong(), problem.what()));
   }
   Problem placed(problem.exit, problem.code, problem.reason, place_in_file(problem.what()));
   for (const auto& [field, description] : problem.violations) {

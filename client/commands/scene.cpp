@@ -30,7 +30,7 @@ void run_new(Context& context, const NewOptions& options) {
 void run_check(Context& context, const std::string& path) {
   v1::CreateSessionRequest request;
   request.set_validate_only(true);
-  const v1::Session session = create_session(context.connection(), path, request);
+  const v1::Session session = create_session(context.connection(), read_scene(path), request);
 
   std::int64_t particles = 0;
   for (const auto& sheet : session.scene().sheets()) {

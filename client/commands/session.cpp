@@ -13,7 +13,8 @@ struct CreateOptions {
 void run_create(Context& context, const CreateOptions& options) {
   v1::CreateSessionRequest request;
   request.set_session_id(options.id);
-  const v1::Session session = create_session(context.connection(), options.path, request);
+  const v1::Session session =
+      create_session(context.connection(), read_scene(options.path), request);
   context.answer(to_json(session), "created " + session.name() + '\n' + plan_text(session.plan()));
 }
 

@@ -1,17 +1,16 @@
 #include <fmt/format.h>
-#include <google/protobuf/util/field_mask_util.h>
 
 #include <algorithm>
 #include <charconv>
 
 #include "client/commands/commands.h"
 #include "client/output/text.h"
+#include "client/textile_change.h"
 
 namespace weft::client {
 namespace {
 
 using google::protobuf::FieldDescriptor;
-using google::protobuf::Message;
 
 void run_list(Context& context) {
   const auto all = context.connection().call(&Textiles::ListTextiles, v1::ListTextilesRequest());
@@ -74,31 +73,6 @@ struct SetOptions {
   std::vector<std::string> values;  // "raw.bend_n_m2=1e-4"
 };
 
-// "raw.bend_n_m2" of "bend_n_m2", where the sheet's textile is raw.
-std::string full_path(const std::string& field, const v1::Textile& present) {
-  const bool known = field.find('.') != std::string::npos ||
-                     v1::Textile::descriptor()->FindFieldByName(field) != nullptr;
-  if (known) return field;
-  return (present.has_raw() ? "raw." : "measured.") + field;
-}
-
-void set_field(v1::Textile& textile, const std::string& path, double value) {
-  Message* message = &textile;
-  std::string field = path;
-  if (const std::size_t dot = path.find('.'); dot != std::string::npos) {
-    const FieldDescriptor* model = message->GetDescriptor()->FindFieldByName(path.substr(0, dot));
-    if (model == nullptr || model->message_type() == nullptr)
-      throw usage_problem("a textile has no field " + path);
-    message = message->GetReflection()->MutableMessage(message, model);
-    field = path.substr(dot + 1);
-  }
-  const FieldDescriptor* target = message->GetDescriptor()->FindFieldByName(field);
-  if (target == nullptr || target->cpp_type() != FieldDescriptor::CPPTYPE_DOUBLE) {
-    throw usage_problem("a textile has no number " + path);
-  }
-  message->GetReflection()->SetDouble(message, target, value);
-}
-
 double read_number(const std::string& text, const std::string& setting) {
   double value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -108,36 +82,21 @@ double read_number(const std::string& text, const std::string& setting) {
   return value;
 }
 
-v1::Textile textile_of(Context& context, const std::string& session,
-                       const std::string& sheet_name) {
-  const v1::Session answer = context.connection().get_session(session);
-  for (const auto& sheet : answer.scene().sheets()) {
-    if (sheet_name.empty() || sheet.name() == sheet_name) return sheet.textile();
-  }
-  return {};  // the server will say that there is no such sheet
-}
-
 void run_set(Context& context, const SetOptions& options) {
   if (options.preset.empty() && options.values.empty()) {
     throw usage_problem("textile set: give --preset or --set");
   }
-  v1::UpdateTextileRequest request;
-  request.set_name(context.session_name(options.session));
-  request.set_sheet(options.sheet);
-  const v1::Textile present = textile_of(context, request.name(), options.sheet);
-  if (!options.preset.empty()) {  // damping and friction are not the preset's
-    *request.mutable_textile() = present;
-    request.mutable_textile()->set_preset(options.preset);
-  }
+  TextileChange change{.sheet = options.sheet, .preset = options.preset};
   for (const auto& setting : options.values) {
     const std::size_t equals = setting.find('=');
     if (equals == std::string::npos)
       throw usage_problem("--set " + setting + ": write FIELD=VALUE");
-    const std::string path = full_path(setting.substr(0, equals), present);
-    set_field(*request.mutable_textile(), path, read_number(setting.substr(equals + 1), setting));
-    request.mutable_update_mask()->add_paths(path);
+    change.values.emplace_back(setting.substr(0, equals),
+                               read_number(setting.substr(equals + 1), setting));
   }
-
+  const std::string name = context.session_name(options.session);
+  const v1::UpdateTextileRequest request =
+      textile_request(context.connection().get_session(name), change);
   const auto response = context.connection().call(&Sessions::UpdateTextile, request);
   context.answer(to_json(response),
                  fmt::format("applied from frame {}\n{}", response.applied_frame(),

@@ -1,0 +1,138 @@
+#include "client/script/check.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/field_mask_util.h>
+
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "client/scene_file.h"
+
+namespace weft::client {
+namespace {
+
+class Checker {
+ public:
+  Checker(Connection& connection, const Script& script, bool replace)
+      : connection_(connection), script_(script), replace_(replace) {}
+
+  void check() {
+    for (const Case& each : script_.cases) {
+      sessions_.clear();
+      for (const Step& step : each.steps)
+        std::visit([&](const auto& what) { check_step(step, what); }, step.what);
+    }
+    faults_.check(script_.path);
+  }
+
+ private:
+  void fault(const Step& step, const std::string& field, const std::string& description) {
+    faults_.add(place_in_script(script_.path, step.line, step.kind + field), description);
+  }
+
+  // What the server would make of the scene; each is asked about once.
+  std::optional<v1::Session> ask(const Step& step, const std::string& session,
+                                 const v1::Scene& scene) {
+    const std::string key = scene.SerializeAsString();
+    if (const auto known = asked_.find(key); known != asked_.end()) return known->second;
+    v1::CreateSessionRequest request;
+    request.set_validate_only(true);
+    try {
+      return asked_[key] = create_session(connection_, scene, request);
+    } catch (const Problem& problem) {
+      if (problem.exit != Exit::kRefused) throw;
+      if (problem.violations.empty()) fault(step, "", session + ": " + problem.what());
+      for (const auto& [field, description] : problem.violations)
+        fault(step, fmt::format(": {} of {}", field, session), description);
+      return asked_[key] = std::nullopt;
+    }
+  }
+
+  void check_step(const Step& step, const CreateStep& what) {
+    sessions_[what.session] = ask(step, what.session, what.scene);
+  }
+
+  void check_step(const Step& step, const SetStep& what) {
+    const auto& session = sessions_[what.session];
+    if (!session) return;  // refused before
+    v1::Scene scene = session->scene();
+    v1::UpdateTextileRequest request;
+    try {
+      request = textile_request(*session, what.change);
+    } catch (const Problem& problem) {
+      return fault(step, ".fields", problem.what());
+    }
+    for (auto& sheet : *scene.mutable_sheets()) {
+      if (!what.change.sheet.empty() && sheet.name() != what.change.sheet) continue;
+      if (what.change.sheet.empty() && scene.sheets_size() > 1) break;
+      if (request.has_update_mask()) {
+        google::protobuf::util::FieldMaskUtil::MergeMessageTo(
+            request.textile(), request.update_mask(), {}, sheet.mutable_textile());
+      } else {
+        *sheet.mutable_textile() = request.textile();
+      }
+      sessions_[what.session] = ask(step, what.session, scene);
+      return;
+    }
+    fault(step, ".sheet",
+          what.change.sheet.empty()
+              ? fmt::format("is missing; {} has {} sheets", what.session, scene.sheets_size())
+              : fmt::format("{} has no sheet \"{}\"", what.session, what.change.sheet));
+  }
+
+  void check_step(const Step& step, const RecordStep& what) {
+    const std::string path =
+        std::filesystem::weakly_canonical(std::filesystem::absolute(what.path)).string();
+    if (!files_.insert(path).second)
+      fault(step, ".file", what.path + " is written more than once; put $case into its name");
+    std::error_code error;
+    const auto directory = std::filesystem::path(path).parent_path();
+    if (!std::filesystem::is_directory(directory, error))
+      fault(step, ".file", fmt::format("there is no directory {}", directory.string()));
+    if (!replace_ && std::filesystem::exists(path, error))
+      fault(step, ".file", what.path + " exists; --force replaces it");
+  }
+
+  void check_step(const Step& step, const ExpectStep& what) {
+    const auto& session = sessions_[what.session];
+    if (!session) return;
+    for (const Expectation& expectation : what.expectations) {
+      if (expectation.quantity != Quantity::kPosition) continue;
+      const v1::Sheet* sheet = nullptr;
+      for (const auto& each : session->scene().sheets()) {
+        const bool meant = expectation.sheet.empty() || each.name() == expectation.sheet;
+        if (meant && sheet == nullptr) sheet = &each;
+      }
+      if (sheet == nullptr) {
+        fault(step, ".particle.sheet",
+              fmt::format("{} has no sheet \"{}\"", what.session, expectation.sheet));
+      } else if (expectation.row >= sheet->grid().rows() ||
+                 expectation.column >= sheet->grid().columns()) {
+        fault(
+            step, ".particle",
+            fmt::format("row {}, column {} is not on a sheet of {} x {} particles", expectation.row,
+                        expectation.column, sheet->grid().rows(), sheet->grid().columns()));
+      }
+    }
+  }
+
+  template <class What>
+  void check_step(const Step&, const What&) {}
+
+  Connection& connection_;
+  const Script& script_;
+  bool replace_;
+  Faults faults_;
+  std::map<std::string, std::optional<v1::Session>> asked_;
+  std::map<std::string, std::optional<v1::Session>> sessions_;  // of the case, as they would be
+  std::set<std::string> files_;                                 // of all cases
+};
+
+}  // namespace
+
+void check_script(Connection& connection, const Script& script, bool replace) {
+  Checker(connection, script, replace).check();
+}
+
+}  // namespace weft::client

@@ -1,0 +1,454 @@
+#include "client/script/script_file.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <google/protobuf/util/json_util.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <functional>
+
+#include "client/input_file.h"
+#include "client/output/json.h"
+#include "client/output/text.h"
+#include "client/scene_file.h"
+#include "client/script/fields.h"
+#include "client/templates/templates.h"
+
+namespace weft::client {
+namespace {
+
+constexpr std::size_t kMostCases = 10'000;
+constexpr std::size_t kMostSteps = 100'000;  // of all cases
+constexpr std::int64_t kLastFrame = 1'000'000'000'000;
+
+using Values = std::vector<std::pair<std::string, std::string>>;
+
+// "k_b-0.1-segments-5" of "k_b 0.1, segments 5", for names of files
+std::string file_name_of(const std::string& name) {
+  std::string result;
+  for (const char c : name) {
+    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.' || c == '_';
+    if (plain) result += c;
+    if (!plain && !result.empty() && result.back() != '-') result += '-';
+  }
+  return result;
+}
+
+class ScriptReader {
+ public:
+  ScriptReader(const std::string& path, const std::map<std::string, std::string>& given)
+      : path_(path), given_(given) {
+    script_.path = path;
+    script_.name = std::filesystem::path(path).stem().string();
+  }
+
+  Script read() {
+    const YAML::Node file = parse();
+    Scope scope{path_, {}, faults_};
+    Fields fields(file, "", scope);
+    if (const auto name = fields.text("name")) script_.name = *name;
+    script_.parallel = static_cast<int>(fields.whole_number("parallel", 1, 1000).value_or(1));
+    read_variables(fields.node("variables"), scope);
+    const std::vector<Values> loops = read_loops(fields, scope);
+    const YAML::Node steps = fields.node("steps");
+    for (const auto& [name, value] : given_) {
+      if (!scope.variables.contains(name) && (loops.empty() || !names(loops[0]).contains(name)))
+        throw usage_problem(
+            fmt::format("--set {}={}: {} has no such variable", name, value, path_));
+    }
+    if (!fields.has("steps")) fields.fault("", "steps are missing");
+    fields.end();
+    if (fields.has("steps")) {
+      for (const Values& values : loops) read_case(steps, scope, values);
+    }
+    faults_.check(path_);
+    return std::move(script_);
+  }
+
+ private:
+  YAML::Node parse() {
+    try {
+      return YAML::Load(read_text(path_));
+    } catch (const YAML::Exception& error) {
+      throw malformed(place_in_script(path_, error.mark.line + 1, ""), error.msg);
+    }
+  }
+
+  static std::map<std::string, std::string> names(const Values& values) {
+    return {values.begin(), values.end()};
+  }
+
+  void read_variables(const YAML::Node& node, Scope& scope) {
+    if (!node.IsDefined()) return;
+    Fields fields(node, "variables", scope);
+    for (const std::string& key : fields.keys()) {
+      const auto value = fields.text(key);
+      const auto given = given_.find(key);
+      scope.variables[key] = given != given_.end() ? given->second : value.value_or("");
+    }
+  }
+
+  // Every combination of the values after `for`, the last changing fastest; without `for` one.
+  std::vector<Values> read_loops(Fields& outer, Scope& scope) {
+    std::vector<Values> all{{}};
+    const YAML::Node node = outer.node("for");
+    if (!outer.has("for")) return all;
+    Fields fields(node, outer.place("for"), scope);
+    for (const std::string& key : fields.keys()) {
+      std::vector<std::string> values = fields.texts(key);
+      if (const auto given = given_.find(key); given != given_.end()) values = {given->second};
+      if (values.empty()) fields.fault(key, "has no value");
+      if (all.size() * values.size() > kMostCases) {
+        fields.fault(key, fmt::format("more than {} combinations", kMostCases));
+        return {{}};
+      }
+      std::vector<Values> longer;
+      for (const Values& so_far : all) {
+        for (const std::string& value : values) {
+          longer.push_back(so_far);
+          longer.back().emplace_back(key, value);
+        }
+      }
+      all = std::move(longer);
+    }
+    return all;
+  }
+
+  void read_case(const YAML::Node& steps, Scope scope, const Values& values) {
+    Case result;
+    for (const auto& [name, value] : values) {
+      result.name += fmt::format("{}{} {}", result.name.empty() ? "" : ", ", name, value);
+      scope.variables[name] = value;
+    }
+    if (result.name.empty()) result.name = script_.name;
+    result.values = values;
+    scope.variables["case"] = file_name_of(result.name);
+    sessions_.clear();
+    read_steps(steps, scope, result.steps);
+    script_.cases.push_back(std::move(result));
+  }
+
+  void read_steps(const YAML::Node& list, Scope& scope, std::vector<Step>& steps) {
+    const auto fault = [&](const YAML::Node& node, const std::string& what) {
+      faults_.add(place_in_script(path_, node.Mark().line + 1, "steps"), what);
+    };
+    if (!list.IsSequence()) return fault(list, "a list of steps is wanted here");
+    for (const auto& node : list) {
+      if (!node.IsMap() || node.size() == 0) {
+        fault(node, "a step is a name and its fields, such as \"run: {until_rest: true}\"");
+        continue;
+      }
+      if (node["for"].IsDefined()) {
+        read_loop(node, scope, steps);
+        continue;
+      }
+      const auto entry = *node.begin();
+      const std::string kind = entry.first.IsScalar() ? entry.first.Scalar() : "?";
+      const int line = entry.first.Mark().line + 1;
+      const auto known = std::find_if(kKinds.begin(), kKinds.end(),
+                                      [&](const Kind& each) { return kind == each.name; });
+      if (node.size() > 1) {
+        fault(node, "a step has one name; begin the next with a dash");
+      } else if (known == kKinds.end()) {
+        std::string names;
+        for (const Kind& each : kKinds) names += std::string(each.name) + ", ";
+        faults_.add(place_in_script(path_, line, kind), "no such step; there are " + names + "for");
+      } else if (++steps_read_ > kMostSteps) {
+        return fault(node, fmt::format("more than {} steps", kMostSteps));
+      } else {
+        Fields fields(entry.second, kind, scope);
+        Step step{.line = line, .kind = kind, .what = (this->*known->read)(fields, scope)};
+        fields.end();
+        steps.push_back(std::move(step));
+      }
+    }
+  }
+
+  void read_loop(const YAML::Node& node, Scope& outer, std::vector<Step>& steps) {
+    Fields fields(node, "", outer);
+    const std::vector<Values> loops = read_loops(fields, outer);
+    const YAML::Node body = fields.node("steps");
+    fields.end();
+    if (!fields.has("steps")) return fields.fault("", "steps are missing");
+    for (const Values& values : loops) {
+      Scope scope = outer;
+      for (const auto& [name, value] : values) scope.variables[name] = value;
+      read_steps(body, scope, steps);
+    }
+  }
+
+  using What = decltype(Step::what);
+
+  // The session meant: the one named, or the only one.
+  std::string read_session(Fields& fields) { return known_session(fields, fields.text("session")); }
+
+  std::string known_session(Fields& fields, const std::optional<std::string>& name) {
+    const auto known = [&] { return fmt::format("{}", fmt::join(sessions_, ", ")); };
+    if (sessions_.empty()) {
+      fields.fault("session", "no session was created before this");
+    } else if (!name) {
+      if (sessions_.size() == 1) return sessions_[0];
+      fields.fault("", "session is missing; there are " + known());
+    } else if (std::find(sessions_.begin(), sessions_.end(), *name) == sessions_.end()) {
+      fields.fault("session", fmt::format("no session \"{}\"; there are {}", *name, known()));
+    }
+    return name.value_or("");
+  }
+
+  What read_create(Fields& fields, Scope& scope) {
+    CreateStep step;
+    step.session = fields.text("session").value_or("cloth");
+    if (std::find(sessions_.begin(), sessions_.end(), step.session) != sessions_.end())
+      fields.fault("session", fmt::format("there is a session \"{}\" already", step.session));
+    sessions_.push_back(step.session);
+
+    const TemplateOptions options = read_template_options(fields);
+    const auto name = fields.text("template");
+    const auto file = fields.text("scene");
+    const YAML::Node changes = fields.node("fields");
+    if (fields.has("template") == fields.has("scene"))
+      fields.fault("", "give either template or scene");
+    const auto try_to = [&](const std::string& key, const auto& work) {
+      try {
+        work();
+      } catch (const Problem& problem) {
+        fields.fault(key, problem.what());
+      }
+    };
+    if (name) try_to("template", [&] { step.scene = make_template(*name, options); });
+    if (file) try_to("scene", [&] { step.scene = read_scene(from_here(*file)); });
+    if (fields.has("fields")) change_scene(changes, scope, step.scene);
+    return step;
+  }
+
+  static TemplateOptions read_template_options(Fields& fields) {
+    constexpr std::array kEvaluators{std::pair{"series", v1::EVALUATOR_SERIES},
+                                     std::pair{"exact", v1::EVALUATOR_EXACT},
+                                     std::pair{"linearized", v1::EVALUATOR_LINEARIZED},
+                                     std::pair{"polynomial", v1::EVALUATOR_POLYNOMIAL}};
+    TemplateOptions options;
+    const auto count = [&](const char* key, std::int64_t most) -> std::optional<int> {
+      const auto number = fields.whole_number(key, 1, most);
+      return number ? std::optional(static_cast<int>(*number)) : std::nullopt;
+    };
+    options.rows = count("rows", 4096);
+    options.columns = count("columns", 4096);
+    options.spacing_m = fields.number("spacing_m", 1e-5, 10);
+    options.textile = fields.text("textile");
+    options.bend = fields.number("bend", 0, 1e5);
+    options.segments = count("segments", 65536);
+    options.fold_clamp = fields.flag("fold_clamp").value_or(false);
+    if (const auto name = fields.text("evaluator")) {
+      for (const auto& [known, evaluator] : kEvaluators) {
+        if (*name == known) options.evaluator = evaluator;
+      }
+      if (!options.evaluator)
+        fields.fault("evaluator",
+                     fmt::format("\"{}\" is not series, exact, linearized or polynomial", *name));
+    }
+    if (fields.has("scene")) {
+      for (const char* key : {"rows", "columns", "spacing_m", "textile", "bend", "segments",
+                              "fold_clamp", "evaluator"}) {
+        if (fields.has(key)) fields.fault(key, "is for a template; use fields with a scene");
+      }
+    }
+    return options;
+  }
+
+  // Values by their place in the scene file: "sheets[0].grid.rows: 9".
+  void change_scene(const YAML::Node& node, Scope& scope, v1::Scene& scene) {
+    Fields fields(node, "create.fields", scope);
+    for (const std::string& key : fields.keys()) {
+      const auto value = fields.text(key);
+      if (!value) continue;
+      std::string pointer = '/' + key;
+      std::replace(pointer.begin(), pointer.end(), '.', '/');
+      std::replace(pointer.begin(), pointer.end(), '[', '/');
+      pointer.erase(std::remove(pointer.begin(), pointer.end(), ']'), pointer.end());
+      v1::Scene changed;
+      try {
+        Json json = to_json(scene, Defaults::kLeftOut);
+        const auto number = read_number(*value);
+        json[Json::json_pointer(pointer)] = number ? Json(*number)
+                                            : *value == "true" || *value == "false"
+                                                ? Json(*value == "true")
+                                                : Json(*value);
+        const auto status = google::protobuf::util::JsonStringToMessage(json.dump(), &changed);
+        if (!status.ok()) {
+          fields.fault(key, std::string(status.message()));
+          continue;
+        }
+      } catch (const Json::exception&) {
+        fields.fault(key, "a scene has no such place");
+        continue;
+      }
+      scene = changed;
+    }
+  }
+
+  What read_set(Fields& fields, Scope& scope) {
+    SetStep step;
+    step.session = read_session(fields);
+    step.change.sheet = fields.text("sheet").value_or("");
+    step.change.preset = fields.text("preset").value_or("");
+    const YAML::Node values = fields.node("fields");
+    if (fields.has("preset") == fields.has("fields"))
+      fields.fault("", "give either preset or fields");
+    if (!fields.has("fields")) return step;
+    Fields numbers(values, "set.fields", scope);
+    for (const std::string& key : numbers.keys()) {
+      if (const auto value = numbers.number(key)) step.change.values.emplace_back(key, *value);
+    }
+    return step;
+  }
+
+  What read_run(Fields& fields, Scope&) {
+    RunStep step;
+    const std::vector<std::string> names = fields.texts("session");
+    for (const std::string& name : names) step.sessions.push_back(known_session(fields, name));
+    if (names.empty()) step.sessions.push_back(known_session(fields, std::nullopt));
+    step.until_frame = fields.whole_number("until_frame", 1, kLastFrame);
+    step.until_time_s = fields.number("until_time_s", 0, 1e9);
+    step.until_rest = fields.flag("until_rest").value_or(false);
+    step.time_scale = fields.number("time_scale", 1e-3, 1000);
+    step.wait = fields.flag("wait").value_or(true);
+    if (fields.has("until_frame") && fields.has("until_time_s"))
+      fields.fault("", "give either until_frame or until_time_s");
+    if (step.wait && !fields.has("until_frame") && !fields.has("until_time_s") && !step.until_rest)
+      fields.fault("", "give until_frame, until_time_s or until_rest, or else wait: false");
+    return step;
+  }
+
+  What read_wait(Fields& fields, Scope&) {
+    WaitStep step{.session = read_session(fields)};
+    const auto frame = fields.whole_number("frame", 0, kLastFrame);
+    if (!fields.has("frame")) fields.fault("", "frame is missing");
+    step.frame = frame.value_or(0);
+    return step;
+  }
+
+  What read_pause(Fields& fields, Scope&) { return PauseStep{.session = read_session(fields)}; }
+
+  What read_record(Fields& fields, Scope&) {
+    RecordStep step;
+    step.session = read_session(fields);
+    if (const auto file = fields.text("file")) step.path = from_here(*file);
+    if (!fields.has("file")) fields.fault("", "file is missing");
+    step.velocities = fields.flag("velocities").value_or(false);
+    if (const auto encoding = fields.text("encoding")) {
+      if (*encoding == "float64") step.encoding = v1::FRAME_ENCODING_FLOAT64;
+      if (*encoding != "float64" && *encoding != "float32")
+        fields.fault("encoding", fmt::format("\"{}\" is not float32 or float64", *encoding));
+    }
+    return step;
+  }
+
+  What read_expect(Fields& fields, Scope& scope) {
+    constexpr std::array kQuantities{std::pair{"frame", Quantity::kFrame},
+                                     std::pair{"time_s", Quantity::kTime},
+                                     std::pair{"rest_time_s", Quantity::kRestTime},
+                                     std::pair{"largest_strain", Quantity::kLargestStrain},
+                                     std::pair{"strain", Quantity::kStrain},
+                                     std::pair{"kinetic_energy_j", Quantity::kKineticEnergy},
+                                     std::pair{"potential_energy_j", Quantity::kPotentialEnergy},
+                                     std::pair{"energy_j", Quantity::kEnergy}};
+    ExpectStep step;
+    step.session = read_session(fields);
+    if (const auto rest = fields.flag("at_rest")) {
+      const double value = *rest ? 1 : 0;
+      step.expectations.push_back(
+          {.quantity = Quantity::kAtRest, .name = "at_rest", .low = value, .high = value});
+    }
+    for (const auto& [name, quantity] : kQuantities) {
+      Expectation expectation{.quantity = quantity, .name = name};
+      if (read_band(fields, name, scope, expectation)) step.expectations.push_back(expectation);
+    }
+    const YAML::Node particle = fields.node("particle");
+    if (fields.has("particle")) {
+      Fields place(particle, "expect.particle", scope);
+      Expectation expectation{.quantity = Quantity::kPosition};
+      expectation.sheet = place.text("sheet").value_or("");
+      expectation.row = static_cast<int>(place.whole_number("row", 0, 4095).value_or(0));
+      expectation.column = static_cast<int>(place.whole_number("column", 0, 4095).value_or(0));
+      for (const char* key : {"row", "column"}) {
+        if (!place.has(key)) place.fault("", std::string(key) + " is missing");
+      }
+      bool any = false;
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::string key = fmt::format("{}_m", "xyz"[axis]);
+        any = any || place.has(key);
+        expectation.axis = axis;
+        expectation.name = "particle." + key;
+        if (read_band(place, key, scope, expectation)) step.expectations.push_back(expectation);
+      }
+      if (!any) place.fault("", "give x_m, y_m or z_m");
+      place.end();
+    }
+    if (step.expectations.empty() && !fields.has("particle"))
+      fields.fault("", "says nothing that is expected");
+    return step;
+  }
+
+  // A number, or {min, max}, or {near, within}.
+  static bool read_band(Fields& fields, const std::string& key, Scope& scope,
+                        Expectation& expectation) {
+    const YAML::Node node = fields.node(key);
+    if (!fields.has(key)) return false;
+    if (!node.IsMap()) {
+      const auto value = fields.number(key);
+      expectation.low = expectation.high = value.value_or(0);
+      return value.has_value();
+    }
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    Fields band(node, fields.place(key), scope);
+    const auto low = band.number("min");
+    const auto high = band.number("max");
+    const auto near = band.number("near");
+    const auto within = band.number("within", 0);
+    band.end();
+    const bool is_range = band.has("min") || band.has("max");
+    const bool is_near = band.has("near") && band.has("within");
+    if (is_range == is_near || band.has("near") != band.has("within")) {
+      band.fault("", "give min, max or both, or near and within");
+      return false;
+    }
+    expectation.low = is_range ? low.value_or(-kAny) : near.value_or(0) - within.value_or(0);
+    expectation.high = is_range ? high.value_or(kAny) : near.value_or(0) + within.value_or(0);
+    if (expectation.low > expectation.high) band.fault("", "min is above max");
+    return true;
+  }
+
+  // Paths are relative to the script.
+  std::string from_here(const std::string& file) const {
+    return (std::filesystem::path(path_).parent_path() / file).string();
+  }
+
+  struct Kind {
+    const char* name;
+    What (ScriptReader::*read)(Fields&, Scope&);
+  };
+  static constexpr std::array<Kind, 7> kKinds{{{"create", &ScriptReader::read_create},
+                                               {"set", &ScriptReader::read_set},
+                                               {"run", &ScriptReader::read_run},
+                                               {"wait", &ScriptReader::read_wait},
+                                               {"pause", &ScriptReader::read_pause},
+                                               {"record", &ScriptReader::read_record},
+                                               {"expect", &ScriptReader::read_expect}}};
+
+  std::string path_;
+  const std::map<std::string, std::string>& given_;
+  Faults faults_;
+  Script script_;
+  std::vector<std::string> sessions_;  // of the case, in order of creation
+  std::size_t steps_read_ = 0;
+};
+
+}  // namespace
+
+Script read_script(const std::string& path, const std::map<std::string, std::string>& values) {
+  return ScriptReader(path, values).read();
+}
+
+}  // namespace weft::client

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "server/rpc/open_calls.h"
+#include "server/rpc/requests.h"
 #include "server/session/limits.h"
 #include "server/session/registry.h"
 #include "server/session/scheduler.h"
@@ -23,6 +24,7 @@ struct Backend {
   const int worker_threads;
   std::atomic<bool> draining = false;  // sessions are not created or changed any more
   OpenCalls calls;
+  Requests requests;
   Scheduler scheduler;
   Scheduler planner{1};
   Registry registry;

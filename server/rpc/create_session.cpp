@@ -129,6 +129,15 @@ grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
     return errors::field_invalid("session.scene", "is absent");
   }
 
+  const auto named = named_request(request, request.request_id());
+  if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
+  const Request& name = std::get<Request>(named);
+  const auto known = backend_.requests.find(name);
+  if (const auto* error = std::get_if<grpc::Status>(&known)) return *error;
+  if (const auto& uid = std::get<std::optional<std::string>>(known)) {
+    return created_before(*uid, response);
+  }
+
   // everything that is wrong with the scene, and its size, before anything is made of it
   auto converted = to_scene(request.session().scene(), "session.scene");
   if (const auto* problems = std::get_if<std::vector<Problem>>(&converted)) {
@@ -165,6 +174,14 @@ grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
   if (const auto reason = backend_.registry.add(session)) {
     return refused(*reason, id, backend_.limits);
   }
+  backend_.requests.remember(name, session->uid());
+  return grpc::Status::OK;
+}
+
+grpc::Status SessionService::created_before(const std::string& uid, v1::Session& response) const {
+  const auto session = backend_.registry.find_uid(uid);
+  if (!session) return errors::session_not_found("that this request made; it was deleted since");
+  response = to_proto(*session);
   return grpc::Status::OK;
 }
 

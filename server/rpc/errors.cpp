@@ -110,6 +110,10 @@ grpc::Status step_unstable(const StepRefusal& step, const std::string& field) {
   return to_grpc(status);
 }
 
+grpc::Status request_used() {
+  return field_invalid("request_id", "was given to another call; give each call one of its own");
+}
+
 grpc::Status message_malformed(const std::string& type) {
   return to_grpc(make(grpc::StatusCode::INVALID_ARGUMENT, "MESSAGE_MALFORMED",
                       "the bytes of the request are no " + type));

@@ -22,6 +22,9 @@ grpc::Status field_invalid(const std::string& field, const std::string& message)
 // `field` is to blame for the step.
 grpc::Status step_unstable(const StepRefusal& step, const std::string& field);
 
+// The request's name came with another call before.
+grpc::Status request_used();
+
 grpc::Status message_malformed(const std::string& type);
 
 grpc::Status session_not_found(const std::string& name);

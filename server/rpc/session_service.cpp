@@ -45,6 +45,8 @@ grpc::Status to_status(const Refusal& refusal, const Session& session) {
       return errors::cancelled();
     case Refusal::Why::kInvalid:
       return errors::field_invalid(refusal.problems);
+    case Refusal::Why::kRequestUsed:
+      return errors::request_used();
     case Refusal::Why::kUnstable:
       break;
   }
@@ -54,10 +56,15 @@ grpc::Status to_status(const Refusal& refusal, const Session& session) {
                                               " substeps, the most that are computed");
 }
 
-// Submits a command, and finishes the call with what becomes of it; `fill` writes the response.
-template <class Fill>
-grpc::ServerUnaryReactor* submit(OpenCalls& calls, const std::shared_ptr<Session>& session,
+// Submits a command under the caller's name for it, and finishes the call with what becomes of it;
+// `fill` writes the response.
+template <class Message, class Fill>
+grpc::ServerUnaryReactor* submit(OpenCalls& calls, grpc::CallbackServerContext* context,
+                                 const Message& request, const std::shared_ptr<Session>& session,
                                  auto command, Fill fill, std::stop_source caller = {}) {
+  const auto named = named_request(request, request.request_id());
+  if (const auto* error = std::get_if<grpc::Status>(&named)) return answer(context, *error);
+  command.request = std::get<Request>(named);
   auto* call = new UnaryCall(calls, [session, caller]() mutable {
     caller.request_stop();
     session->wake();
@@ -138,9 +145,15 @@ grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerCont
 
 grpc::Status SessionService::erase(const v1::DeleteSessionRequest& request) {
   if (backend_.draining) return errors::server_draining();
+  const auto named = named_request(request, request.request_id());
+  if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
+  const auto known = backend_.requests.find(std::get<Request>(named));
+  if (const auto* error = std::get_if<grpc::Status>(&known)) return *error;
+  if (std::get<std::optional<std::string>>(known)) return grpc::Status::OK;
   const auto found = find_session(backend_.registry, request.name());
   if (const auto* session = std::get_if<std::shared_ptr<Session>>(&found)) {
     backend_.registry.erase(*session);
+    backend_.requests.remember(std::get<Request>(named), (*session)->uid());
     return grpc::Status::OK;
   }
   const auto& error = std::get<grpc::Status>(found);
@@ -165,11 +178,12 @@ grpc::ServerUnaryReactor* SessionService::UpdateTextile(grpc::CallbackServerCont
       [request](const Textile& current) {  // the request lives until the call is finished
         return merge_textile(current, request->textile(), request->update_mask());
       };
-  return submit(backend_.calls, session, std::move(command), [response](const Applied& applied) {
-    response->set_applied_frame(applied.frame);
-    *response->mutable_textile() = to_proto(applied.textile);
-    *response->mutable_plan() = to_proto(*applied.plan);
-  });
+  return submit(backend_.calls, context, *request, session, std::move(command),
+                [response](const Applied& applied) {
+                  response->set_applied_frame(applied.frame);
+                  *response->mutable_textile() = to_proto(applied.textile);
+                  *response->mutable_plan() = to_proto(*applied.plan);
+                });
 }
 
 grpc::ServerUnaryReactor* SessionService::StepSession(grpc::CallbackServerContext* context,
@@ -188,14 +202,14 @@ grpc::ServerUnaryReactor* SessionService::StepSession(grpc::CallbackServerContex
   if (request->has_expected_frame()) command.expected_frame = request->expected_frame();
 
   std::stop_source caller;
-  command.cancelled = caller.get_token();
+  if (request->request_id().empty()) command.cancelled = caller.get_token();
   const auto fill = [response](const Applied& applied) {
     response->set_applied_frame(applied.frame);
-    response->set_frame(applied.newest->number);
-    response->set_time_s(applied.newest->time);
-    response->set_at_rest(applied.newest->at_rest);
+    response->set_frame(applied.newest);
+    response->set_time_s(applied.time);
+    response->set_at_rest(applied.at_rest);
   };
-  return submit(backend_.calls, session, std::move(command), fill, caller);
+  return submit(backend_.calls, context, *request, session, std::move(command), fill, caller);
 }
 
 grpc::ServerUnaryReactor* SessionService::RunSession(grpc::CallbackServerContext* context,
@@ -215,7 +229,8 @@ grpc::ServerUnaryReactor* SessionService::RunSession(grpc::CallbackServerContext
   }
   if (request->has_until_frame()) command.until_frame = request->until_frame();
   command.until_rest = request->until_rest();
-  return submit(backend_.calls, std::get<std::shared_ptr<Session>>(found), std::move(command),
+  return submit(backend_.calls, context, *request, std::get<std::shared_ptr<Session>>(found),
+                std::move(command),
                 [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
 }
 
@@ -224,7 +239,8 @@ grpc::ServerUnaryReactor* SessionService::PauseSession(grpc::CallbackServerConte
                                                        v1::PauseSessionResponse* response) {
   const auto found = find_session(backend_.registry, request->name());
   if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
-  return submit(backend_.calls, std::get<std::shared_ptr<Session>>(found), PauseCommand{},
+  return submit(backend_.calls, context, *request, std::get<std::shared_ptr<Session>>(found),
+                PauseCommand{},
                 [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
 }
 

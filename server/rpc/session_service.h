@@ -47,6 +47,7 @@ class SessionService final : public v1::SessionService::CallbackService {
   bool begin(const std::shared_ptr<Creation>& creation);  // false: the server is going down
   void end(const std::shared_ptr<Creation>& creation);
   grpc::Status create(const v1::CreateSessionRequest& request, v1::Session& response);
+  grpc::Status created_before(const std::string& uid, v1::Session& response) const;
   grpc::Status get(const v1::GetSessionRequest& request, v1::Session& response) const;
   grpc::Status list(const v1::ListSessionsRequest& request,
                     v1::ListSessionsResponse& response) const;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/simulation.h"
-#include "server/session/frame.h"
+#include "server/session/request.h"
 
 // What can be asked of a session between two frames, and how it answers.
 namespace weft {
@@ -28,6 +28,7 @@ struct Refusal {
     kCancelled,    // the caller went away
     kInvalid,      // see problems
     kUnstable,     // see step
+    kRequestUsed,  // the request's id was given to another call
   };
   Why why;
   std::int64_t frame = 0;  // newest frame
@@ -37,9 +38,11 @@ struct Refusal {
 
 // How a session stood when a command had been carried out.
 struct Applied {
-  std::int64_t frame = 0;  // first frame in which it shows
-  std::shared_ptr<const Frame> newest;
-  Textile textile;  // of SetTextile
+  std::int64_t frame = 0;   // first frame in which it shows
+  std::int64_t newest = 0;  // frame
+  double time = 0;          // of the newest, s
+  bool at_rest = false;     // the newest
+  Textile textile;          // of SetTextile
   std::shared_ptr<const Plan> plan;
 };
 
@@ -53,6 +56,7 @@ struct StepCommand {
   std::int64_t frames = 1;
   std::optional<std::int64_t> expected_frame;
   std::stop_token cancelled;
+  Request request;
   Done done;
 };
 
@@ -61,11 +65,13 @@ struct RunCommand {
   std::optional<double> time_scale;  // simulated s per s; absent: as fast as possible
   std::optional<std::int64_t> until_frame;
   bool until_rest = false;
+  Request request;
   Done done;
 };
 
 // Ends a run, and steps under way.
 struct PauseCommand {
+  Request request;
   Done done;
 };
 
@@ -77,6 +83,7 @@ using TextileEdit = std::function<std::variant<Textile, std::vector<Problem>>(co
 struct SetTextile {
   std::size_t sheet = 0;
   TextileEdit edit;
+  Request request;
   Done done;
 };
 

@@ -29,6 +29,14 @@ std::shared_ptr<Session> Registry::find(const std::string& id) const {
   return found == sessions_.end() ? nullptr : found->second;
 }
 
+std::shared_ptr<Session> Registry::find_uid(const std::string& uid) const {
+  std::lock_guard lock(mutex_);
+  for (const auto& [id, session] : sessions_) {
+    if (session->uid() == uid) return session;
+  }
+  return nullptr;
+}
+
 std::vector<std::shared_ptr<Session>> Registry::list(const std::string& after,
                                                      std::size_t count) const {
   std::lock_guard lock(mutex_);
@@ -45,13 +53,15 @@ std::size_t Registry::size() const {
   return sessions_.size();
 }
 
-void Registry::erase(const std::shared_ptr<Session>& session) {
+bool Registry::erase(const std::shared_ptr<Session>& session) {
   {
     std::lock_guard lock(mutex_);
     const auto found = sessions_.find(session->id());
-    if (found != sessions_.end() && found->second == session) sessions_.erase(found);
+    if (found == sessions_.end() || found->second != session) return false;
+    sessions_.erase(found);
   }
   session->close(Refusal::Why::kDeleted);
+  return true;
 }
 
 void Registry::close(Refusal::Why why) {

@@ -25,12 +25,14 @@ class Registry {
 
   std::shared_ptr<Session> find(const std::string& id) const;  // or nullptr
 
+  std::shared_ptr<Session> find_uid(const std::string& uid) const;  // or nullptr
+
   // In order of id, at most `count` of those after `after`.
   std::vector<std::shared_ptr<Session>> list(const std::string& after, std::size_t count) const;
   std::size_t size() const;
 
-  // Takes a session out and ends it, where there is one.
-  void erase(const std::shared_ptr<Session>& session);
+  // Takes a session out and ends it; false where it is not one of them.
+  bool erase(const std::shared_ptr<Session>& session);
 
   // Ends every session, and adds none any more. They can still be found.
   void close(Refusal::Why why);

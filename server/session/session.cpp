@@ -114,8 +114,51 @@ void Session::execute_commands() {
       command = std::move(commands_.front());
       commands_.pop_front();
     }
-    std::visit([&](auto& next) { execute(std::move(next)); }, *command);
+    if (!answer_again(*command)) {
+      std::visit([&](auto& next) { execute(std::move(next)); }, *command);
+    }
   }
+}
+
+// Whether the command is one that was sent before; it gets the answer of the first.
+bool Session::answer_again(Command& command) {
+  const Request& request =
+      std::visit([](auto& each) -> const Request& { return each.request; }, command);
+  if (request.id.empty()) return false;
+  Done& done = std::visit([](auto& each) -> Done& { return each.done; }, command);
+  std::optional<Outcome> outcome;
+  {
+    std::lock_guard lock(mutex_);
+    if (const auto* known = answers_.find(request)) {
+      const bool same = known->checksum == request.checksum;
+      outcome = same ? known->answer : refuse(Refusal::Why::kRequestUsed);
+    }
+    for (auto& step : steps_) {
+      if (outcome || step.command.request.id != request.id) continue;
+      if (step.command.request.checksum != request.checksum) {
+        outcome = refuse(Refusal::Why::kRequestUsed);
+      } else {
+        step.command.done = [first = std::move(step.command.done),
+                             again = std::move(done)](const Outcome& both) {
+          first(both);
+          again(both);
+        };
+        return true;
+      }
+    }
+  }
+  if (!outcome) return false;
+  done(*outcome);
+  return true;
+}
+
+// What changed something is remembered; what was refused may be tried again.
+void Session::answer(const Request& request, const Done& done, const Outcome& outcome) {
+  const auto* refusal = std::get_if<Refusal>(&outcome);
+  if (refusal == nullptr || refusal->why == Refusal::Why::kInterrupted) {
+    answers_.remember(request, outcome);
+  }
+  done(outcome);
 }
 
 void Session::execute(StepCommand command) {
@@ -149,7 +192,7 @@ void Session::execute(RunCommand command) {
     }
   }
   offer_to_all();
-  command.done(outcome);
+  answer(command.request, command.done, outcome);
 }
 
 void Session::execute(PauseCommand command) {
@@ -171,8 +214,12 @@ void Session::execute(PauseCommand command) {
     }
   }
   offer_to_all();
-  for (const auto& step : steps) step.command.done(interrupted);
-  command.done(outcome);
+  for (const auto& step : steps) {
+    // one that had begun is not begun again
+    const Request request = step.first ? step.command.request : Request{};
+    answer(request, step.command.done, interrupted);
+  }
+  answer(command.request, command.done, outcome);
 }
 
 void Session::execute(SetTextile command) {
@@ -199,27 +246,27 @@ void Session::execute(SetTextile command) {
     done.textile = textiles_[command.sheet];
     return done;
   };
-  command.done(change());
+  answer(command.request, command.done, change());
 }
 
 // Answers steps that are done, and begins the next one.
 void Session::settle_steps() {
-  std::vector<Answer> answers;
+  std::vector<std::pair<StepCommand, Outcome>> settled;
   {
     std::lock_guard lock(mutex_);
     std::erase_if(steps_, [&](Step& step) {
       if (!step.command.cancelled.stop_requested()) return false;
-      answers.emplace_back(std::move(step.command.done), refuse(Refusal::Why::kCancelled));
+      settled.emplace_back(std::move(step.command), refuse(Refusal::Why::kCancelled));
       return true;
     });
     while (!steps_.empty()) {
       auto outcome = settle(steps_.front());
       if (!outcome) break;
-      answers.emplace_back(std::move(steps_.front().command.done), std::move(*outcome));
+      settled.emplace_back(std::move(steps_.front().command), std::move(*outcome));
       steps_.pop_front();
     }
   }
-  for (const auto& [done, outcome] : answers) done(outcome);
+  for (const auto& [command, outcome] : settled) answer(command.request, command.done, outcome);
 }
 
 // The answer to the first step; absent while it is under way.
@@ -305,6 +352,11 @@ std::int64_t Session::first_held_frame() const {
     }
   }
   return first;
+}
+
+Applied Session::applied(std::int64_t frame) const {
+  const Frame& newest = *history_.latest();
+  return {frame, newest.number, newest.time, newest.at_rest, {}, plan_};
 }
 
 Progress Session::progress() const {

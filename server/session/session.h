@@ -33,6 +33,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
  public:
   // Commands that may wait; more are refused (kBusy).
   static constexpr std::size_t kMaxCommands = 256;
+  // Answers that are remembered, for those who send a named request again.
+  static constexpr std::size_t kMaxAnswers = 1000;
 
   // PAUSED at frame 0. Precondition: the simulation has no refusal. The scheduler outlives the
   // session; at least two frames are kept, more as long as they fit into `history_bytes`.
@@ -74,10 +76,11 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
     Clock::time_point start_time;  // of the pace, when the frame was start_frame
     std::int64_t start_frame = 0;
   };
-  using Answer = std::pair<Done, Outcome>;
 
   // on the scheduler's thread
   void execute_commands();
+  bool answer_again(Command& command);
+  void answer(const Request& request, const Done& done, const Outcome& outcome);
   void execute(StepCommand command);
   void execute(RunCommand command);
   void execute(PauseCommand command);
@@ -95,7 +98,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::int64_t first_held_frame() const;
   Progress progress() const;
   Refusal refuse(Refusal::Why why) const { return {why, latest(), {}, {}}; }
-  Applied applied(std::int64_t frame) const { return {frame, history_.latest(), {}, plan_}; }
+  Applied applied(std::int64_t frame) const;
   std::optional<Outcome> settle(Step& step) const;
 
   // of subscriptions
@@ -108,7 +111,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   const std::string uid_;
   const std::chrono::system_clock::time_point create_time_ = std::chrono::system_clock::now();
   Scheduler& scheduler_;
-  Simulation simulation_;  // touched by the slice only
+  Simulation simulation_;                  // touched by the slice only
+  Answers<Outcome> answers_{kMaxAnswers};  // touched by the slice only
   const Scene scene_;
 
   mutable std::mutex mutex_;  // guards all below

@@ -83,7 +83,8 @@ bool Answer::is_there() const {
 
 Answer step(Session& session, std::int64_t frames) {
   return {session,
-          StepCommand{.frames = frames, .expected_frame = {}, .cancelled = {}, .done = {}}};
+          StepCommand{
+              .frames = frames, .expected_frame = {}, .cancelled = {}, .request = {}, .done = {}}};
 }
 
 Answer run(Session& session, std::optional<std::int64_t> until_frame) {

@@ -34,7 +34,7 @@ TEST(Session, StepsAsManyFramesAsAskedAndAnswersWhenTheyExist) {
   const auto session = make_session(scheduler);
   const Applied first = step(*session, 3).applied();
   EXPECT_EQ(first.frame, 1);
-  EXPECT_EQ(first.newest->number, 3);
+  EXPECT_EQ(first.newest, 3);
   const Applied second = step(*session, 2).applied();
   EXPECT_EQ(second.frame, 4);
   EXPECT_EQ(session->status().newest->number, 5);
@@ -52,7 +52,8 @@ TEST(Session, CarriesOutStepsOneAfterTheOther) {
 TEST(Session, ComputesTheFramesThatTheSolverAloneComputes) {
   Scheduler scheduler(2);
   const auto session = make_session(scheduler);
-  const auto newest = step(*session, 20).applied().newest;
+  step(*session, 20).applied();
+  const auto newest = session->status().newest;
   Simulation alone(hung_scene());
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(alone.advance_frame());
   std::vector<double> positions(newest->positions.size());
@@ -101,9 +102,9 @@ TEST(Session, RunsUntilItIsPaused) {
   watcher->wait_for_frame(10);
   EXPECT_EQ(step(*session, 1).refused(), Refusal::Why::kRunning);
   const Applied paused = pause(*session).applied();
-  EXPECT_EQ(paused.frame, paused.newest->number + 1);
+  EXPECT_EQ(paused.frame, paused.newest + 1);
   EXPECT_EQ(session->status().state, SessionState::kPaused);
-  EXPECT_EQ(session->status().newest->number, paused.newest->number) << "it went on";
+  EXPECT_EQ(session->status().newest->number, paused.newest) << "it went on";
 }
 
 TEST(Session, RunsNoFasterThanItsPace) {
@@ -134,7 +135,8 @@ TEST(Session, ChangesATextileFromTheNextFrameOn) {
   const auto session = make_session(scheduler);
   step(*session, 5).applied();
   EXPECT_EQ(set_bend(*session, 1e-3).applied().frame, 6);
-  const auto newest = step(*session, 5).applied().newest;
+  step(*session, 5).applied();
+  const auto newest = session->status().newest;
   EXPECT_EQ(std::get<RawTextile>(session->status().textiles[0].model).bend, 1e-3);
 
   Simulation alone(hung_scene());

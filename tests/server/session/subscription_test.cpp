@@ -74,7 +74,7 @@ TEST(Subscription, ASessionThatIsHeldStillAnswersCalls) {
   const auto watcher = Watcher::of(*session, 0, SlowReader::kHoldSession);
   run(*session).applied();
   watcher->wait_for_frame(4);
-  EXPECT_EQ(pause(*session).applied().newest->number, 4);
+  EXPECT_EQ(pause(*session).applied().newest, 4);
 }
 
 TEST(Subscription, LeavingReleasesTheSession) {
@@ -84,7 +84,7 @@ TEST(Subscription, LeavingReleasesTheSession) {
   Answer stepping = step(*session, 100);
   watcher->wait_for_frame(4);
   watcher->leave();
-  EXPECT_EQ(stepping.applied().newest->number, 100);
+  EXPECT_EQ(stepping.applied().newest, 100);
 }
 
 TEST(Subscription, OfAFailedSessionEndsAfterTheLastGoodFrame) {

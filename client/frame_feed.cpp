@@ -66,6 +66,14 @@ bool FrameFeed::note(const v1::StreamFramesResponse& message) {
   last_heard_ = Clock::now();
   pause_ = kFirstPause;
   if (message.has_header()) {
+    const std::string& numerics = message.header().numerics_id();
+    if (header_seen_ && numerics != numerics_id_) {
+      throw Problem(Exit::kRefused, "FAILED_PRECONDITION", "NUMERICS_CHANGED",
+                    fmt::format("the server went from numerics {} to {}: the frames to come do not "
+                                "continue those before to the bit",
+                                numerics_id_, numerics));
+    }
+    numerics_id_ = numerics;
     request_.set_uid(message.header().uid());
     if (!request_.has_start_frame()) request_.set_start_frame(message.header().start_frame());
     return !std::exchange(header_seen_, true);

@@ -41,6 +41,7 @@ class FrameFeed {
   std::chrono::seconds patience_;
   std::stop_token stop_;
   bool header_seen_ = false;
+  std::string numerics_id_;  // of the header
   int reconnections_ = 0;
   Clock::time_point last_heard_;
   std::chrono::milliseconds pause_{};

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <variant>
 #include <vector>
@@ -90,16 +91,30 @@ void read_file(const std::string& path, Config& config) {
       set(*number, value_of<std::int64_t>(node, where, "a whole number"), where);
     } else if (key == "host") {
       config.server.host = value_of<std::string>(node, where, "a text");
+    } else if (key == "data_dir") {
+      config.server.data_dir = value_of<std::string>(node, where, "a text");
     } else if (key == "insecure") {
       config.insecure = value_of<bool>(node, where, "true or false");
     } else if (key == "log_level") {
       set_log_level(config, value_of<std::string>(node, where, "a text"), where);
     } else {
-      std::string keys = "host, insecure, log_level";
+      std::string keys = "host, data_dir, insecure, log_level";
       for (const auto& each : known) keys += std::string(", ") + each.key;
       refuse(where + " is not known; there are " + keys);
     }
   }
+}
+
+// Of the service manager, or the user's own.
+std::string default_data_dir() {
+  const auto variable = [](const char* name) {
+    const char* value = std::getenv(name);
+    return std::string(value == nullptr ? "" : value);
+  };
+  if (const auto state = variable("STATE_DIRECTORY"); !state.empty()) return state;
+  if (const auto state = variable("XDG_STATE_HOME"); !state.empty()) return state + "/weft";
+  if (const auto home = variable("HOME"); !home.empty()) return home + "/.local/state/weft";
+  return "/var/lib/weft";
 }
 
 bool is_loopback(const std::string& host) {
@@ -112,15 +127,20 @@ bool is_loopback(const std::string& host) {
 Config read_config(int argc, const char* const* argv) {
   Config config;
   config.server.port = kDefaultPort;
+  config.server.data_dir = default_data_dir();
 
   CLI::App app("weftd - the Weft server: simulates textiles and streams their frames over gRPC.",
                "weftd");
-  std::string file, host, log_level;
+  std::string file, host, data_dir, log_level;
   bool insecure = false;
   app.add_option("--config", file, "TOML file; its keys are the flags below, with _ for -")
       ->type_name("FILE");
   app.add_option("--host", host, "Address to listen on [" + *config.server.host + "]")
       ->type_name("ADDRESS");
+  app.add_option("--data-dir", data_dir,
+                 "Directory where sessions are kept over restarts, or none [" +
+                     *config.server.data_dir + "]")
+      ->type_name("DIR");
   app.add_flag("--insecure", insecure, "Allow a host other machines can reach, unencrypted");
   app.add_option("--log-level", log_level, "trace, debug, info, warn, error or off [info]")
       ->type_name("LEVEL");
@@ -153,6 +173,9 @@ Config read_config(int argc, const char* const* argv) {
     if (app.count(flag) > 0) set(known[i], values[i], flag);
   }
   if (app.count("--host") > 0) config.server.host = host;
+  if (app.count("--data-dir") > 0) config.server.data_dir = data_dir;
+  if (config.server.data_dir->empty()) refuse("data_dir is empty; give a directory, or none");
+  if (*config.server.data_dir == "none") config.server.data_dir.reset();
   if (app.count("--log-level") > 0) set_log_level(config, log_level, "--log-level");
   config.insecure |= insecure;
   if (!is_loopback(*config.server.host) && !config.insecure) {

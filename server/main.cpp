@@ -19,6 +19,8 @@ int serve(const weft::Config& config) {
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
+
   spdlog::set_default_logger(spdlog::stderr_logger_mt("weftd"));
   spdlog::set_level(spdlog::level::from_str(config.log_level));
 

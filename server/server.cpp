@@ -8,6 +8,7 @@
 
 #include "server/rpc/backend.h"
 #include "server/rpc/frame_service.h"
+#include "server/rpc/restore.h"
 #include "server/rpc/server_service.h"
 #include "server/rpc/session_service.h"
 #include "server/rpc/textile_service.h"
@@ -46,7 +47,9 @@ void enable_plugins() {
 }  // namespace
 
 struct Server::Parts {
-  explicit Parts(const ServerOptions& options) : backend(options.limits, options.worker_threads) {}
+  explicit Parts(const ServerOptions& options)
+      : backend(options.limits, options.worker_threads,
+                options.data_dir ? open_sqlite_store(*options.data_dir) : make_no_store()) {}
 
   Backend backend;
   SessionService sessions{backend};
@@ -58,6 +61,7 @@ struct Server::Parts {
 };
 
 Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(options)) {
+  restore_sessions(parts_->backend);
   enable_plugins();
   grpc::ServerBuilder builder;
   set_transport(builder, options.limits);
@@ -84,7 +88,8 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
 
 Server::~Server() {
   stop();
-  parts_->backend.planner.stop();  // the scene it is at still needs the services
+  parts_->backend.planner.stop();    // the scene it is at still needs the services
+  parts_->backend.scheduler.stop();  // and sessions the store
 }
 
 std::shared_ptr<grpc::Channel> Server::in_process_channel() {

@@ -16,13 +16,15 @@ struct ServerOptions {
   std::optional<std::string> host = "127.0.0.1";  // absent: reached by in_process_channel() only
   int port = 0;                                   // 0: a free one
   int worker_threads = static_cast<int>(std::thread::hardware_concurrency());
+  std::optional<std::string> data_dir;  // where sessions are kept; absent: they end with the server
   Limits limits;
 };
 
 // A running textile service.
 class Server {
  public:
-  // Serves once constructed. Throws std::runtime_error where the address cannot be had.
+  // Serves once constructed, with the sessions that were kept. Throws std::runtime_error where the
+  // address or the data directory cannot be had.
   explicit Server(const ServerOptions& options);
   ~Server();  // stops
 

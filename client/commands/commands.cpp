@@ -68,6 +68,8 @@ std::string state_text(v1::SessionState state) {
       return "paused";
     case v1::SESSION_STATE_RUNNING:
       return "running";
+    case v1::SESSION_STATE_RESTORING:
+      return "restoring";
     case v1::SESSION_STATE_FAILED:
       return "failed";
     default:

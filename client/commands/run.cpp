@@ -27,7 +27,10 @@ v1::Progress wait_for_end(Context& context, const std::string& session) {
   while (const auto message = feed.next()) {
     if (!message->has_progress()) continue;
     const v1::Progress& progress = message->progress();
-    if (progress.state() != v1::SESSION_STATE_RUNNING) return progress;
+    if (progress.state() != v1::SESSION_STATE_RUNNING &&
+        progress.state() != v1::SESSION_STATE_RESTORING) {
+      return progress;
+    }
     status.show({fmt::format("running: frame {}", progress.latest_frame())});
   }
   throw interrupted();

@@ -33,6 +33,7 @@ void let_run(Connection& connection, const RecordingOrder& order) {
 bool has_ended(const v1::Progress& progress, const Tally& tally) {
   const bool advanced = tally.frames > 1;
   return advanced && progress.state() != v1::SESSION_STATE_RUNNING &&
+         progress.state() != v1::SESSION_STATE_RESTORING &&
          progress.latest_frame() == tally.last_frame;
 }
 

@@ -2,22 +2,26 @@
 
 #include <atomic>
 #include <cstddef>
+#include <memory>
+#include <utility>
 
 #include "server/rpc/open_calls.h"
 #include "server/rpc/requests.h"
 #include "server/session/limits.h"
 #include "server/session/registry.h"
 #include "server/session/scheduler.h"
+#include "server/store/store.h"
 
 namespace weft {
 
 // What the services share. The registry goes first, while sessions can still reach the scheduler.
 // Scenes are planned on a thread of their own, so that a large one holds up no session.
 struct Backend {
-  Backend(const Limits& given, int threads)
+  Backend(const Limits& given, int threads, std::unique_ptr<SessionStore> sessions)
       : limits(given),
         worker_threads(threads),
         scheduler(threads),
+        store(std::move(sessions)),
         registry(static_cast<std::size_t>(given.max_sessions)) {}
 
   const Limits limits;
@@ -27,6 +31,7 @@ struct Backend {
   Requests requests;
   Scheduler scheduler;
   Scheduler planner{1};
+  const std::unique_ptr<SessionStore> store;
   Registry registry;
 };
 

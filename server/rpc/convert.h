@@ -32,6 +32,11 @@ enum class StartValues { kIncluded, kLeftOut };
 // With every default filled in.
 v1::Session to_proto(const Session& session, StartValues start_values = StartValues::kIncluded);
 v1::Textile to_proto(const Textile& textile);
+
+// As it was given: a clamp that follows from the stretch stays absent.
+v1::Textile as_given(const Textile& textile);
+v1::Scene as_given(const Scene& scene);
+
 v1::Plan to_proto(const Plan& plan);
 v1::SessionState to_proto(SessionState state);
 

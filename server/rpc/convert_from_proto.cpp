@@ -299,15 +299,6 @@ std::vector<Problem> mask_problems(const Textile& current, const v1::Textile& ch
   return problems;
 }
 
-// The textile as it was given: a clamp that follows from the stretch stays absent.
-v1::Textile as_given(const Textile& textile) {
-  v1::Textile given = to_proto(textile);
-  if (const auto* raw = std::get_if<RawTextile>(&textile.model); raw && !raw->clamp) {
-    given.mutable_raw()->clear_clamp_n_per_m();
-  }
-  return given;
-}
-
 }  // namespace
 
 Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field) {

@@ -185,6 +185,7 @@ v1::Session to_proto(const Session& session, StartValues start_values) {
   result.set_at_rest(status.newest->at_rest);
   *result.mutable_plan() = to_proto(*status.plan);
   result.set_failure(status.failure);
+  result.set_numerics_id(session.numerics_id());
   const auto since_epoch = session.create_time().time_since_epoch();
   *result.mutable_create_time() = google::protobuf::util::TimeUtil::NanosecondsToTimestamp(
       std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count());
@@ -197,6 +198,25 @@ v1::Textile to_proto(const Textile& textile) {
   result.set_damping_kg_per_s(textile.damping);
   result.set_friction_coefficient(textile.friction);
   return result;
+}
+
+v1::Textile as_given(const Textile& textile) {
+  v1::Textile given = to_proto(textile);
+  if (const auto* raw = std::get_if<RawTextile>(&textile.model); raw && !raw->clamp) {
+    given.mutable_raw()->clear_clamp_n_per_m();
+  }
+  return given;
+}
+
+v1::Scene as_given(const Scene& scene) {
+  std::vector<Textile> textiles;
+  for (const auto& sheet : scene.sheets) textiles.push_back(sheet.textile);
+  v1::Scene given;
+  set(&given, scene, textiles, StartValues::kIncluded);
+  for (int i = 0; i < given.sheets_size(); ++i) {
+    *given.mutable_sheets(i)->mutable_textile() = as_given(textiles[static_cast<std::size_t>(i)]);
+  }
+  return given;
 }
 
 v1::Plan to_proto(const Plan& plan) {
@@ -230,6 +250,8 @@ v1::Plan to_proto(const Plan& plan) {
 
 v1::SessionState to_proto(SessionState state) {
   switch (state) {
+    case SessionState::kRestoring:
+      return v1::SESSION_STATE_RESTORING;
     case SessionState::kPaused:
       return v1::SESSION_STATE_PAUSED;
     case SessionState::kRunning:

@@ -4,6 +4,7 @@
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/names.h"
+#include "server/rpc/server_service.h"
 #include "server/rpc/session_service.h"
 #include "server/rpc/unary_call.h"
 
@@ -161,17 +162,26 @@ grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
 
   Simulation simulation(std::move(scene));
   if (const auto refusal = simulation.refusal()) return refused_step(simulation, *refusal);
-  const auto session = std::make_shared<Session>(
-      id, std::move(simulation),
-      static_cast<std::size_t>(backend_.limits.history_bytes_per_session), backend_.scheduler);
+  const SessionIdentity identity = make_identity(id, numerics_id());
+  const auto session =
+      std::make_shared<Session>(identity, std::move(simulation),
+                                static_cast<std::size_t>(backend_.limits.history_bytes_per_session),
+                                backend_.scheduler, backend_.store->log_of(identity.uid, 0));
   response = to_proto(*session);
   if (request.validate_only()) {
     response.clear_name();
     response.clear_uid();
     response.clear_create_time();
+    response.clear_numerics_id();
     return grpc::Status::OK;
   }
+  try {
+    backend_.store->add({identity, session->scene()}, name);
+  } catch (const StoreError& error) {
+    return errors::store_unwritable(error.what());
+  }
   if (const auto reason = backend_.registry.add(session)) {
+    backend_.store->erase(identity.uid, {}, [](const std::string&) {});
     return refused(*reason, id, backend_.limits);
   }
   backend_.requests.remember(name, session->uid());

@@ -133,6 +133,13 @@ grpc::Status session_exists(const std::string& name) {
   return to_grpc(status);
 }
 
+grpc::Status session_damaged(const std::string& name, const std::string& why) {
+  auto status = make(grpc::StatusCode::DATA_LOSS, "SESSION_DAMAGED",
+                     "what was kept of " + name + " is damaged: " + why + "; it can be deleted");
+  add_resource(status, "Session", name);
+  return to_grpc(status);
+}
+
 grpc::Status textile_not_found(const std::string& name) {
   auto status = make(grpc::StatusCode::NOT_FOUND, "TEXTILE_NOT_FOUND",
                      "there is no textile " + name + "; ListTextiles names them all");
@@ -177,6 +184,13 @@ grpc::Status exhausted(const std::string& subject, const std::string& message, b
   violation->set_description(clipped(message));
   status.add_details()->PackFrom(quota);
   if (retry) add_retry(status);
+  return to_grpc(status);
+}
+
+grpc::Status store_unwritable(const std::string& why) {
+  auto status = make(grpc::StatusCode::UNAVAILABLE, "STORE_UNWRITABLE",
+                     "the call was not carried out, because it cannot be written down: " + why);
+  add_retry(status);
   return to_grpc(status);
 }
 

@@ -29,6 +29,7 @@ grpc::Status message_malformed(const std::string& type);
 
 grpc::Status session_not_found(const std::string& name);
 grpc::Status session_exists(const std::string& name);
+grpc::Status session_damaged(const std::string& name, const std::string& why);
 grpc::Status textile_not_found(const std::string& name);
 
 grpc::Status failed_precondition(const std::string& reason, const std::string& message,
@@ -42,6 +43,9 @@ grpc::Status solver_failed(const std::string& failure, std::int64_t latest_frame
 
 // Something the server has only so much of. `subject` names it, such as "sessions".
 grpc::Status exhausted(const std::string& subject, const std::string& message, bool retry);
+
+// A call that could not be written down, and was not carried out.
+grpc::Status store_unwritable(const std::string& why);
 
 grpc::Status server_draining(const Metadata& metadata = {});
 

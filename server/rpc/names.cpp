@@ -14,6 +14,10 @@ constexpr std::string_view kCollection = "sessions/";
 
 std::string session_name(const std::string& id) { return std::string(kCollection) + id; }
 
+std::string id_of(const std::string& name) {
+  return name.starts_with(kCollection) ? name.substr(kCollection.size()) : "";
+}
+
 bool is_session_id(const std::string& id) {
   const auto letter = [](char c) { return c >= 'a' && c <= 'z'; };
   return !id.empty() && id.size() <= 63 && letter(id.front()) &&
@@ -30,13 +34,14 @@ std::string make_session_id() {
 
 FoundSession find_session(const Registry& registry, const std::string& name,
                           const std::string& field) {
-  const std::string id = name.starts_with(kCollection) ? name.substr(kCollection.size()) : "";
+  const std::string id = id_of(name);
   if (!is_session_id(id)) {
     return errors::field_invalid(field, "\"" + name +
                                             "\" is not sessions/ and 1 to 63 characters of a-z, "
                                             "0-9 and -, beginning with a letter");
   }
   if (auto session = registry.find(id)) return session;
+  if (const auto damaged = registry.damaged(id)) return errors::session_damaged(name, damaged->why);
   return errors::session_not_found(name);
 }
 

@@ -13,6 +13,9 @@ namespace weft {
 
 std::string session_name(const std::string& id);
 
+// The id in such a name; empty where it is none.
+std::string id_of(const std::string& name);
+
 // 1 to 63 characters of [a-z0-9-], beginning with a letter.
 bool is_session_id(const std::string& id);
 

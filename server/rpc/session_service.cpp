@@ -47,6 +47,8 @@ grpc::Status to_status(const Refusal& refusal, const Session& session) {
       return errors::field_invalid(refusal.problems);
     case Refusal::Why::kRequestUsed:
       return errors::request_used();
+    case Refusal::Why::kNotKept:
+      return errors::store_unwritable(refusal.text);
     case Refusal::Why::kUnstable:
       break;
   }
@@ -140,25 +142,42 @@ grpc::Status SessionService::list(const v1::ListSessionsRequest& request,
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         v1::DeleteSessionResponse*) {
-  return answer(context, erase(*request));
-}
+  if (backend_.draining) return answer(context, errors::server_draining());
+  const auto named = named_request(*request, request->request_id());
+  if (const auto* error = std::get_if<grpc::Status>(&named)) return answer(context, *error);
+  const Request& name = std::get<Request>(named);
+  const auto known = backend_.requests.find(name);
+  if (const auto* error = std::get_if<grpc::Status>(&known)) return answer(context, *error);
+  if (std::get<std::optional<std::string>>(known)) return answer(context, grpc::Status::OK);
 
-grpc::Status SessionService::erase(const v1::DeleteSessionRequest& request) {
-  if (backend_.draining) return errors::server_draining();
-  const auto named = named_request(request, request.request_id());
-  if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
-  const auto known = backend_.requests.find(std::get<Request>(named));
-  if (const auto* error = std::get_if<grpc::Status>(&known)) return *error;
-  if (std::get<std::optional<std::string>>(known)) return grpc::Status::OK;
-  const auto found = find_session(backend_.registry, request.name());
-  if (const auto* session = std::get_if<std::shared_ptr<Session>>(&found)) {
-    backend_.registry.erase(*session);
-    backend_.requests.remember(std::get<Request>(named), (*session)->uid());
-    return grpc::Status::OK;
+  const auto found = find_session(backend_.registry, request->name());
+  std::shared_ptr<Session> session;
+  std::string uid;
+  if (const auto* there = std::get_if<std::shared_ptr<Session>>(&found)) {
+    session = *there;
+    uid = session->uid();
+  } else {
+    const auto& error = std::get<grpc::Status>(found);
+    const bool missing = error.error_code() == grpc::StatusCode::NOT_FOUND;
+    if (missing && request->allow_missing()) return answer(context, grpc::Status::OK);
+    if (error.error_code() != grpc::StatusCode::DATA_LOSS) return answer(context, error);
+    if (const auto damaged = backend_.registry.damaged(id_of(request->name()))) uid = damaged->uid;
   }
-  const auto& error = std::get<grpc::Status>(found);
-  const bool missing = error.error_code() == grpc::StatusCode::NOT_FOUND;
-  return missing && request.allow_missing() ? grpc::Status::OK : error;
+
+  auto* call = new UnaryCall(backend_.calls);
+  backend_.store->erase(
+      uid, name,
+      [this, call, session, uid, name, id = id_of(request->name())](const std::string& error) {
+        if (!error.empty()) return call->Finish(errors::store_unwritable(error));
+        backend_.requests.remember(name, uid);
+        if (session) {
+          backend_.registry.erase(session);
+        } else {
+          backend_.registry.erase_damaged(id);
+        }
+        call->Finish(grpc::Status::OK);
+      });
+  return call;
 }
 
 grpc::ServerUnaryReactor* SessionService::UpdateTextile(grpc::CallbackServerContext* context,

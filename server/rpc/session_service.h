@@ -51,7 +51,6 @@ class SessionService final : public v1::SessionService::CallbackService {
   grpc::Status get(const v1::GetSessionRequest& request, v1::Session& response) const;
   grpc::Status list(const v1::ListSessionsRequest& request,
                     v1::ListSessionsResponse& response) const;
-  grpc::Status erase(const v1::DeleteSessionRequest& request);
 
   Backend& backend_;
   std::mutex mutex_;

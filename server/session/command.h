@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -29,11 +30,13 @@ struct Refusal {
     kInvalid,      // see problems
     kUnstable,     // see step
     kRequestUsed,  // the request's id was given to another call
+    kNotKept,      // its log cannot be written, see text
   };
   Why why;
   std::int64_t frame = 0;  // newest frame
   std::vector<Problem> problems;
   StepRefusal step;
+  std::string text;
 };
 
 // How a session stood when a command had been carried out.

@@ -16,9 +16,31 @@ std::optional<Registry::Refused> Registry::add(std::shared_ptr<Session> session)
   return refused;
 }
 
+void Registry::restore(std::shared_ptr<Session> session) {
+  std::lock_guard lock(mutex_);
+  const std::string id = session->id();
+  sessions_.emplace(id, std::move(session));
+}
+
+void Registry::restore(const std::string& id, Damaged damaged) {
+  std::lock_guard lock(mutex_);
+  damaged_.emplace(id, std::move(damaged));
+}
+
+std::optional<Registry::Damaged> Registry::damaged(const std::string& id) const {
+  std::lock_guard lock(mutex_);
+  const auto found = damaged_.find(id);
+  return found == damaged_.end() ? std::nullopt : std::optional(found->second);
+}
+
+void Registry::erase_damaged(const std::string& id) {
+  std::lock_guard lock(mutex_);
+  damaged_.erase(id);
+}
+
 std::optional<Registry::Refused> Registry::refusal_locked(const std::string& id) const {
   if (closed_) return Refused::kClosed;
-  if (sessions_.contains(id)) return Refused::kExists;
+  if (sessions_.contains(id) || damaged_.contains(id)) return Refused::kExists;
   if (sessions_.size() >= max_sessions_) return Refused::kFull;
   return std::nullopt;
 }

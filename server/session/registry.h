@@ -23,6 +23,17 @@ class Registry {
   std::optional<Refused> refusal(const std::string& id) const;
   std::optional<Refused> add(std::shared_ptr<Session> session);
 
+  // Of an earlier process: more than `max_sessions` may be.
+  void restore(std::shared_ptr<Session> session);
+  // Something that has the name of a session but is none.
+  struct Damaged {
+    std::string uid;
+    std::string why;
+  };
+  void restore(const std::string& id, Damaged damaged);
+  std::optional<Damaged> damaged(const std::string& id) const;
+  void erase_damaged(const std::string& id);
+
   std::shared_ptr<Session> find(const std::string& id) const;  // or nullptr
 
   std::shared_ptr<Session> find_uid(const std::string& uid) const;  // or nullptr
@@ -43,6 +54,7 @@ class Registry {
   std::size_t max_sessions_;
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<Session>> sessions_;
+  std::map<std::string, Damaged> damaged_;
   bool closed_ = false;
 };
 

@@ -1,6 +1,8 @@
 #include "server/session/session.h"
 
 #include <algorithm>
+#include <cassert>
+#include <iterator>
 #include <limits>
 #include <new>
 #include <random>
@@ -24,17 +26,38 @@ std::vector<Textile> textiles_of(const Scene& scene) {
 
 }  // namespace
 
-Session::Session(std::string id, Simulation simulation, std::size_t history_bytes,
-                 Scheduler& scheduler)
-    : id_(std::move(id)),
-      uid_(make_uid()),
+SessionIdentity make_identity(std::string id, std::string numerics_id) {
+  return {std::move(id), make_uid(), std::move(numerics_id), std::chrono::system_clock::now()};
+}
+
+Session::Session(SessionIdentity identity, Simulation simulation, std::size_t history_bytes,
+                 Scheduler& scheduler, std::unique_ptr<SessionLog> log)
+    : identity_(std::move(identity)),
       scheduler_(scheduler),
+      log_(std::move(log)),
       simulation_(std::move(simulation)),
       scene_(simulation_.scene()),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),
       history_(history_bytes) {
   history_.push(make_frame(), 0);
+}
+
+void Session::restore(SessionPast past) {
+  {
+    std::lock_guard lock(mutex_);
+    reach_ = past.reach;
+    if (past.log.empty()) return;
+    set_state(SessionState::kRestoring);
+    restoring_ = Restoring{
+        {std::make_move_iterator(past.log.begin()), std::make_move_iterator(past.log.end())},
+        past.reach.frame};
+    if (past.reach.holders > 0) {
+      past_holders_ =
+          PastHolders{past.reach.holders, past.reach.held_from, Clock::now() + kHoldAfterRestore};
+    }
+  }
+  wake();
 }
 
 SessionStatus Session::status() const {
@@ -83,16 +106,93 @@ void Session::close(Refusal::Why why) {
 
 std::optional<Clock::time_point> Session::run_slice() {
   try {
-    execute_commands();
-    settle_steps();
+    if (!settle()) return std::nullopt;
+    write_reach();
     const auto due = next_due();
     if (!due || *due > Clock::now()) return due;
     compute_frame();
+    if (!settle()) return std::nullopt;
+    write_reach();
   } catch (const std::bad_alloc&) {
     fail("the server ran out of memory");
   }
-  settle_steps();
   return next_due();
+}
+
+// Does what is to be done between two frames; false while it waits for the log.
+bool Session::settle() {
+  for (;;) {
+    if (!settle_writing()) return false;
+    if (!settle_restoring()) return true;
+    if (execute_command()) continue;
+    if (settle_steps()) return true;
+  }
+}
+
+bool Session::settle_writing() {
+  std::function<void(const std::string&)> then;
+  std::string error;
+  {
+    std::lock_guard lock(mutex_);
+    if (!writing_.then) return true;
+    if (!writing_.written) return false;
+    then = std::exchange(writing_.then, nullptr);
+    error = *std::exchange(writing_.written, std::nullopt);
+  }
+  then(error);
+  return true;
+}
+
+// Repeats what was done at this frame; false where there is more, after the next frame.
+bool Session::settle_restoring() {
+  for (;;) {
+    LogEntry entry;
+    {
+      std::lock_guard lock(mutex_);
+      if (!restoring_) return true;
+    }
+    settle_steps();
+    {
+      std::lock_guard lock(mutex_);
+      auto& log = restoring_->log;
+      if (log.empty()) {
+        if ((run_ || steps_begun()) && latest() < restoring_->frame) return false;
+        break;
+      }
+      if (log.front().frame > latest()) return false;
+      entry = std::move(log.front());
+      log.pop_front();
+    }
+    apply_again(entry);
+  }
+  {
+    std::lock_guard lock(mutex_);
+    restoring_.reset();
+    set_state(run_ ? SessionState::kRunning : SessionState::kPaused);
+    if (run_) {
+      run_->start_time = Clock::now();
+      run_->start_frame = latest();
+    }
+  }
+  offer_to_all();
+  return true;
+}
+
+void Session::apply_again(const LogEntry& entry) {
+  const Done nobody = [](const Outcome&) {};
+  if (const auto* begun = std::get_if<StepsBegun>(&entry.event)) {
+    StepCommand command;
+    command.frames = begun->frames;
+    command.request = entry.request;
+    command.done = nobody;
+    std::lock_guard lock(mutex_);
+    steps_.push_back({std::move(command), latest() + 1});
+  } else if (std::holds_alternative<StepsEnded>(entry.event)) {
+    std::lock_guard lock(mutex_);
+    if (!steps_.empty()) steps_.pop_front();
+  } else {
+    answer(entry.request, nobody, apply(entry.event));
+  }
 }
 
 void Session::fail(const std::string& why) {
@@ -100,24 +200,25 @@ void Session::fail(const std::string& why) {
     std::lock_guard lock(mutex_);
     failure_ = why + "; frame " + std::to_string(latest()) + " is the last";
     run_.reset();
+    restoring_.reset();
     set_state(SessionState::kFailed);
   }
   offer_to_all();
 }
 
-void Session::execute_commands() {
-  for (;;) {
-    std::optional<Command> command;
-    {
-      std::lock_guard lock(mutex_);
-      if (commands_.empty()) return;
-      command = std::move(commands_.front());
-      commands_.pop_front();
-    }
-    if (!answer_again(*command)) {
-      std::visit([&](auto& next) { execute(std::move(next)); }, *command);
-    }
+// False where none waits.
+bool Session::execute_command() {
+  std::optional<Command> command;
+  {
+    std::lock_guard lock(mutex_);
+    if (commands_.empty()) return false;
+    command = std::move(commands_.front());
+    commands_.pop_front();
   }
+  if (!answer_again(*command)) {
+    std::visit([&](auto& next) { execute(std::move(next)); }, *command);
+  }
+  return true;
 }
 
 // Whether the command is one that was sent before; it gets the answer of the first.
@@ -161,6 +262,70 @@ void Session::answer(const Request& request, const Done& done, const Outcome& ou
   done(outcome);
 }
 
+// Writes what is done at this frame to the log; the session stands still until then.
+void Session::write(const Request& request, const Event& event,
+                    std::function<void(const std::string&)> then) {
+  LogEntry entry{0, request, event};
+  Reach reach;
+  {
+    std::lock_guard lock(mutex_);
+    entry.frame = latest();
+    reach = reach_to(reach_after(entry.event));
+    writing_.then = std::move(then);
+    writing_.written.reset();
+  }
+  log_->write(entry, reach, [self = shared_from_this(), reach](const std::string& error) {
+    {
+      std::lock_guard lock(self->mutex_);
+      if (error.empty()) self->reach_ = reach;
+      self->writing_.written = error;
+    }
+    self->wake();
+  });
+}
+
+// Does something when it is in the log, and answers.
+void Session::carry_out(const Request& request, const Done& done, const Event& event) {
+  write(request, event, [this, request, done, event](const std::string& error) {
+    std::optional<Refusal> refusal;
+    {
+      std::lock_guard lock(mutex_);
+      refusal = refusal_of_change();
+      if (!refusal && !error.empty()) {
+        refusal = refuse(Refusal::Why::kNotKept);
+        refusal->text = error;
+      }
+    }
+    answer(request, done, refusal ? Outcome(*refusal) : apply(event));
+  });
+}
+
+// Has the log say in advance how far frames are published, so that none is ever changed.
+void Session::write_reach() {
+  Reach reach;
+  {
+    std::lock_guard lock(mutex_);
+    if (writing_.reach || writing_.then || closed_ || restoring_ || !active()) return;
+    const std::int64_t wanted = std::min(latest() + ahead_ / 2, goal());
+    if (reach_.frame >= wanted && reach_suffices()) return;
+    constexpr std::int64_t kLeast = 8, kMost = 4096;
+    const auto now = Clock::now();
+    if (now - reach_time_ < std::chrono::milliseconds(500)) ahead_ = std::min(2 * ahead_, kMost);
+    if (now - reach_time_ > std::chrono::seconds(2)) ahead_ = std::max(ahead_ / 2, kLeast);
+    reach_time_ = now;
+    reach = reach_to(std::min(latest() + ahead_, goal()));
+    writing_.reach = true;
+  }
+  log_->write(std::nullopt, reach, [self = shared_from_this(), reach](const std::string&) {
+    {
+      std::lock_guard lock(self->mutex_);
+      self->reach_ = reach;  // even where it could not be written: the session goes on
+      self->writing_.reach = false;
+    }
+    self->wake();
+  });
+}
+
 void Session::execute(StepCommand command) {
   std::optional<Refusal> refusal;
   {
@@ -175,102 +340,129 @@ void Session::execute(StepCommand command) {
 }
 
 void Session::execute(RunCommand command) {
-  Outcome outcome;
+  std::optional<Refusal> refusal;
   {
     std::lock_guard lock(mutex_);
-    if (closed_) {
-      outcome = refuse(*closed_);
-    } else if (state_ == SessionState::kFailed) {
-      outcome = refuse(Refusal::Why::kFailed);
-    } else if (command.until_frame && *command.until_frame <= latest()) {
-      outcome = refuse(Refusal::Why::kNotAhead);
-    } else {
-      run_ =
-          Run{command.time_scale, command.until_frame, command.until_rest, Clock::now(), latest()};
-      set_state(SessionState::kRunning);
-      outcome = applied(latest() + 1);
+    refusal = refusal_of_change();
+    if (!refusal && command.until_frame && *command.until_frame <= latest()) {
+      refusal = refuse(Refusal::Why::kNotAhead);
     }
   }
-  offer_to_all();
-  answer(command.request, command.done, outcome);
+  if (refusal) return command.done(*refusal);
+  carry_out(command.request, command.done,
+            RunBegun{command.time_scale, command.until_frame, command.until_rest});
 }
 
 void Session::execute(PauseCommand command) {
+  std::optional<Refusal> refusal;
+  {
+    std::lock_guard lock(mutex_);
+    refusal = refusal_of_change();
+  }
+  if (refusal) return command.done(*refusal);
+  carry_out(command.request, command.done, Paused{});
+}
+
+void Session::execute(SetTextile command) {
+  std::optional<Refusal> refusal;
+  {
+    std::lock_guard lock(mutex_);
+    refusal = refusal_of_change();
+  }
+  if (refusal) return command.done(*refusal);
+  const auto edited = command.edit(simulation_.scene().sheets[command.sheet].textile);
+  if (const auto* problems = std::get_if<std::vector<Problem>>(&edited)) {
+    std::unique_lock lock(mutex_);
+    refusal = refuse(Refusal::Why::kInvalid);
+    lock.unlock();
+    refusal->problems = *problems;
+    return command.done(*refusal);
+  }
+  carry_out(command.request, command.done, TextileSet{command.sheet, std::get<Textile>(edited)});
+}
+
+Outcome Session::apply(const Event& event) {
+  if (const auto* run = std::get_if<RunBegun>(&event)) return apply(*run);
+  if (const auto* change = std::get_if<TextileSet>(&event)) return apply(*change);
+  assert(std::holds_alternative<Paused>(event));
+  return pause();
+}
+
+Outcome Session::apply(const RunBegun& run) {
+  Outcome outcome;
+  {
+    std::lock_guard lock(mutex_);
+    run_ = Run{run.time_scale, run.until_frame, run.until_rest, Clock::now(), latest()};
+    set_state(SessionState::kRunning);
+    outcome = applied(latest() + 1);
+  }
+  offer_to_all();
+  return outcome;
+}
+
+Outcome Session::pause() {
   std::deque<Step> steps;
   Outcome outcome;
   Refusal interrupted;
   {
     std::lock_guard lock(mutex_);
     interrupted = refuse(Refusal::Why::kInterrupted);
-    if (closed_) {
-      outcome = refuse(*closed_);
-    } else if (state_ == SessionState::kFailed) {
-      outcome = refuse(Refusal::Why::kFailed);
-    } else {
-      steps.swap(steps_);
-      run_.reset();
-      set_state(SessionState::kPaused);
-      outcome = applied(latest() + 1);
-    }
+    steps.swap(steps_);
+    run_.reset();
+    set_state(SessionState::kPaused);
+    outcome = applied(latest() + 1);
   }
   offer_to_all();
   for (const auto& step : steps) {
     // one that had begun is not begun again
-    const Request request = step.first ? step.command.request : Request{};
-    answer(request, step.command.done, interrupted);
+    answer(step.first ? step.command.request : Request{}, step.command.done, interrupted);
   }
-  answer(command.request, command.done, outcome);
+  return outcome;
 }
 
-void Session::execute(SetTextile command) {
-  Outcome outcome;
-  const auto change = [&]() -> Outcome {
-    {
-      std::lock_guard lock(mutex_);
-      if (closed_) return refuse(*closed_);
-      if (state_ == SessionState::kFailed) return refuse(Refusal::Why::kFailed);
-    }
-    const auto edited = command.edit(simulation_.scene().sheets[command.sheet].textile);
-    std::optional<StepRefusal> step;
-    if (const auto* textile = std::get_if<Textile>(&edited)) {
-      step = simulation_.set_textile(command.sheet, *textile);
-    }
-    std::lock_guard lock(mutex_);
-    if (const auto* problems = std::get_if<std::vector<Problem>>(&edited)) {
-      return Refusal{Refusal::Why::kInvalid, latest(), *problems, {}};
-    }
-    if (step) return Refusal{Refusal::Why::kUnstable, latest(), {}, *step};
-    textiles_[command.sheet] = std::get<Textile>(edited);
-    plan_ = std::make_shared<const Plan>(simulation_.plan());
-    Applied done = applied(latest() + 1);
-    done.textile = textiles_[command.sheet];
-    return done;
-  };
-  answer(command.request, command.done, change());
+// Refused or not, the log repeats it: what it depends on is the same then.
+Outcome Session::apply(const TextileSet& change) {
+  const auto step = simulation_.set_textile(change.sheet, change.textile);
+  std::lock_guard lock(mutex_);
+  if (step) return Refusal{Refusal::Why::kUnstable, latest(), {}, *step, {}};
+  textiles_[change.sheet] = change.textile;
+  plan_ = std::make_shared<const Plan>(simulation_.plan());
+  Applied done = applied(latest() + 1);
+  done.textile = change.textile;
+  return done;
 }
 
-// Answers steps that are done, and begins the next one.
-void Session::settle_steps() {
+// Answers steps that are over, and begins the next one; false when the log is to be written for it.
+bool Session::settle_steps() {
   std::vector<std::pair<StepCommand, Outcome>> settled;
+  bool begin = false, end = false;
   {
     std::lock_guard lock(mutex_);
     std::erase_if(steps_, [&](Step& step) {
-      if (!step.command.cancelled.stop_requested()) return false;
+      if (step.first || !step.command.cancelled.stop_requested()) return false;
       settled.emplace_back(std::move(step.command), refuse(Refusal::Why::kCancelled));
       return true;
     });
     while (!steps_.empty()) {
-      auto outcome = settle(steps_.front());
-      if (!outcome) break;
-      settled.emplace_back(std::move(steps_.front().command), std::move(*outcome));
-      steps_.pop_front();
+      const Step& step = steps_.front();
+      if (auto outcome = settle(step)) {
+        settled.emplace_back(std::move(steps_.front().command), std::move(*outcome));
+        steps_.pop_front();
+        continue;
+      }
+      begin = !step.first;
+      end = step.first && step.command.cancelled.stop_requested();
+      break;
     }
   }
   for (const auto& [command, outcome] : settled) answer(command.request, command.done, outcome);
+  if (begin) begin_step();
+  if (end) end_step();
+  return !begin && !end;
 }
 
-// The answer to the first step; absent while it is under way.
-std::optional<Outcome> Session::settle(Step& step) const {
+// The answer to the first step; absent while it is under way, or to be begun.
+std::optional<Outcome> Session::settle(const Step& step) const {
   const auto& command = step.command;
   if (state_ == SessionState::kFailed) return refuse(Refusal::Why::kFailed);
   if (!step.first) {
@@ -278,10 +470,54 @@ std::optional<Outcome> Session::settle(Step& step) const {
     if (command.expected_frame && *command.expected_frame != latest()) {
       return refuse(Refusal::Why::kStale);
     }
-    step.first = latest() + 1;
+    return std::nullopt;
   }
   if (latest() - *step.first + 1 < command.frames) return std::nullopt;
   return applied(*step.first);
+}
+
+void Session::begin_step() {
+  Request request;
+  StepsBegun event;
+  {
+    std::lock_guard lock(mutex_);
+    if (steps_.empty()) return;  // closed meanwhile
+    request = steps_.front().command.request;
+    event.frames = steps_.front().command.frames;
+  }
+  write(request, event, [this](const std::string& error) {
+    StepCommand command;
+    Refusal refusal;
+    {
+      std::lock_guard lock(mutex_);
+      if (steps_.empty()) return;  // closed meanwhile
+      if (error.empty()) {
+        steps_.front().first = latest() + 1;
+        return;
+      }
+      refusal = refuse(Refusal::Why::kNotKept);
+      refusal.text = error;
+      command = std::move(steps_.front().command);
+      steps_.pop_front();
+    }
+    command.done(refusal);
+  });
+}
+
+// Ends the step whose caller went away.
+void Session::end_step() {
+  write({}, StepsEnded{}, [this](const std::string& /*error*/) {
+    StepCommand command;
+    Refusal refusal;
+    {
+      std::lock_guard lock(mutex_);
+      if (steps_.empty()) return;  // closed meanwhile
+      refusal = refuse(Refusal::Why::kCancelled);
+      command = std::move(steps_.front().command);
+      steps_.pop_front();
+    }
+    command.done(refusal);
+  });
 }
 
 void Session::compute_frame() {
@@ -305,12 +541,14 @@ void Session::compute_frame() {
 // When the next frame is to be computed; nullopt: not before something happens.
 std::optional<Clock::time_point> Session::next_due() {
   std::lock_guard lock(mutex_);
-  if (closed_ || (steps_.empty() && !run_)) return std::nullopt;
+  if (closed_ || writing_.then || !active()) return std::nullopt;
   if (history_.full() && first_held_frame() <= history_.oldest()) {
     held_ = true;
-    return std::nullopt;
+    return past_holders_ ? std::optional(past_holders_->until) : std::nullopt;
   }
-  if (!steps_.empty() || !run_->time_scale) return Clock::time_point::min();
+  if (restoring_) return Clock::time_point::min();
+  if (latest() >= reach_.frame || !reach_suffices()) return std::nullopt;  // being written
+  if (steps_begun() || !run_->time_scale) return Clock::time_point::min();
   const double frames = static_cast<double>(latest() + 1 - run_->start_frame);
   const std::chrono::duration<double> since_start =
       std::chrono::duration<double>(frames * scene_.solver.frame_step / *run_->time_scale);
@@ -333,7 +571,9 @@ std::shared_ptr<const Frame> Session::make_frame() const {
   return frame;
 }
 
+// While it is restored it shows nothing else, but a failure.
 void Session::set_state(SessionState state) {
+  if (restoring_ && state != SessionState::kFailed) return;
   if (state != state_) ++state_changes_;
   state_ = state;
 }
@@ -343,15 +583,62 @@ bool Session::reached(const Run& run) const {
          (run.until_rest && history_.latest()->at_rest);
 }
 
-// First frame that a subscriber with HOLD_SESSION still needs.
-std::int64_t Session::first_held_frame() const {
+// Last frame that is to be computed as things are.
+std::int64_t Session::goal() const {
+  constexpr auto kNever = std::numeric_limits<std::int64_t>::max();
+  std::int64_t goal = latest();
+  if (run_) goal = std::max(goal, run_->until_frame.value_or(kNever));
+  if (steps_begun()) {
+    goal = std::max(goal, *steps_.front().first + steps_.front().command.frames - 1);
+  }
+  return goal;
+}
+
+Reach Session::reach_to(std::int64_t frame) {
+  Reach reach{frame, past_holders_ ? past_holders_->count : 0, first_held_frame()};
+  for (const Subscription* subscription : subscriptions_) {
+    if (subscription->policy_ == SlowReader::kHoldSession) ++reach.holders;
+  }
+  if (reach.holders == 0) reach.held_from = 0;
+  return reach;
+}
+
+// How far frames may be published once the event is in the log.
+std::int64_t Session::reach_after(const Event& event) const {
+  if (const auto* steps = std::get_if<StepsBegun>(&event)) {
+    return latest() + std::min(steps->frames, ahead_);
+  }
+  if (const auto* run = std::get_if<RunBegun>(&event)) {
+    const std::int64_t ahead = latest() + ahead_;
+    return run->until_frame ? std::min(ahead, std::max(*run->until_frame, goal())) : ahead;
+  }
+  const bool goes_on = std::holds_alternative<TextileSet>(event)
+                           ? active()
+                           : std::holds_alternative<StepsEnded>(event) && run_.has_value();
+  return goes_on ? std::max(latest(), reach_.frame) : latest();
+}
+
+// Whether the log knows of all subscribers that frames are held for.
+bool Session::reach_suffices() { return reach_to(0).holders <= reach_.holders; }
+
+// First frame that is still needed by a subscriber with HOLD_SESSION, or by one that may come back.
+std::int64_t Session::first_held_frame() {
   auto first = std::numeric_limits<std::int64_t>::max();
+  if (past_holders_ && past_holders_->until <= Clock::now()) past_holders_.reset();
+  if (past_holders_) first = past_holders_->held_from;
   for (const Subscription* subscription : subscriptions_) {
     if (subscription->policy_ == SlowReader::kHoldSession) {
       first = std::min(first, subscription->next_);
     }
   }
   return first;
+}
+
+// What keeps a session from being changed.
+std::optional<Refusal> Session::refusal_of_change() const {
+  if (closed_) return refuse(*closed_);
+  if (state_ == SessionState::kFailed) return refuse(Refusal::Why::kFailed);
+  return std::nullopt;
 }
 
 Applied Session::applied(std::int64_t frame) const {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,10 +14,22 @@
 #include "core/simulation.h"
 #include "server/session/command.h"
 #include "server/session/history.h"
+#include "server/session/log.h"
 #include "server/session/scheduler.h"
 #include "server/session/subscription.h"
 
 namespace weft {
+
+// Names of a session, and when it was created.
+struct SessionIdentity {
+  std::string id;
+  std::string uid;          // another session of the same id has another one
+  std::string numerics_id;  // of the server that created it
+  std::chrono::system_clock::time_point create_time;
+};
+
+// A new session's, with a uid of 128 random bits.
+SessionIdentity make_identity(std::string id, std::string numerics_id);
 
 // What a session shows of itself.
 struct SessionStatus {
@@ -27,22 +40,37 @@ struct SessionStatus {
   std::string failure;
 };
 
+// What a session did before, in another process.
+struct SessionPast {
+  std::vector<LogEntry> log;
+  Reach reach;
+};
+
 // A simulation that advances on a scheduler. Calls reach it as commands that are carried out
-// between two frames; frames leave as shared, constant values. All public methods are thread-safe.
+// between two frames, each when it is safe in the log; frames leave as shared, constant values. All
+// public methods are thread-safe.
 class Session : public Task, public std::enable_shared_from_this<Session> {
  public:
   // Commands that may wait; more are refused (kBusy).
   static constexpr std::size_t kMaxCommands = 256;
   // Answers that are remembered, for those who send a named request again.
   static constexpr std::size_t kMaxAnswers = 1000;
+  // How long a session that was restored waits for subscribers that it had held frames for.
+  static constexpr std::chrono::seconds kHoldAfterRestore{30};
 
   // PAUSED at frame 0. Precondition: the simulation has no refusal. The scheduler outlives the
   // session; at least two frames are kept, more as long as they fit into `history_bytes`.
-  Session(std::string id, Simulation simulation, std::size_t history_bytes, Scheduler& scheduler);
+  Session(SessionIdentity identity, Simulation simulation, std::size_t history_bytes,
+          Scheduler& scheduler, std::unique_ptr<SessionLog> log);
 
-  const std::string& id() const { return id_; }
-  const std::string& uid() const { return uid_; }
-  std::chrono::system_clock::time_point create_time() const { return create_time_; }
+  // Computes again what there was before any command is carried out, then goes on as it was. Called
+  // at most once, first.
+  void restore(SessionPast past);
+
+  const std::string& id() const { return identity_.id; }
+  const std::string& uid() const { return identity_.uid; }
+  const std::string& numerics_id() const { return identity_.numerics_id; }
+  std::chrono::system_clock::time_point create_time() const { return identity_.create_time; }
 
   // As it was created; for textiles see status().
   const Scene& scene() const { return scene_; }
@@ -76,16 +104,47 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
     Clock::time_point start_time;  // of the pace, when the frame was start_frame
     std::int64_t start_frame = 0;
   };
+  // Writes to the log that are under way.
+  struct Writing {
+    std::function<void(const std::string& error)> then;  // of an entry; the session waits for it
+    std::optional<std::string> written;                  // its outcome
+    bool reach = false;                                  // of the reach alone
+  };
+  // What is left of a past to be computed again.
+  struct Restoring {
+    std::deque<LogEntry> log;
+    std::int64_t frame = 0;  // as far as frames may have been published
+  };
+  // Subscribers of the past that may come back.
+  struct PastHolders {
+    int count = 0;
+    std::int64_t held_from = 0;
+    Clock::time_point until;
+  };
 
   // on the scheduler's thread
-  void execute_commands();
+  bool settle();
+  bool settle_writing();
+  bool settle_restoring();
+  bool execute_command();
   bool answer_again(Command& command);
   void answer(const Request& request, const Done& done, const Outcome& outcome);
   void execute(StepCommand command);
   void execute(RunCommand command);
   void execute(PauseCommand command);
   void execute(SetTextile command);
-  void settle_steps();
+  bool settle_steps();
+  void begin_step();
+  void end_step();
+  void write(const Request& request, const Event& event,
+             std::function<void(const std::string&)> then);
+  void carry_out(const Request& request, const Done& done, const Event& event);
+  void write_reach();
+  void apply_again(const LogEntry& entry);
+  Outcome apply(const Event& event);  // but steps
+  Outcome apply(const RunBegun& run);
+  Outcome pause();
+  Outcome apply(const TextileSet& change);
   void compute_frame();
   void fail(const std::string& why);
   std::optional<Clock::time_point> next_due();
@@ -95,11 +154,18 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::int64_t latest() const { return history_.latest()->number; }
   void set_state(SessionState state);
   bool reached(const Run& run) const;
-  std::int64_t first_held_frame() const;
+  bool steps_begun() const { return !steps_.empty() && steps_.front().first; }
+  std::int64_t goal() const;
+  Reach reach_to(std::int64_t frame);
+  std::int64_t reach_after(const Event& event) const;
+  bool reach_suffices();
+  std::int64_t first_held_frame();
   Progress progress() const;
-  Refusal refuse(Refusal::Why why) const { return {why, latest(), {}, {}}; }
+  Refusal refuse(Refusal::Why why) const { return {why, latest(), {}, {}, {}}; }
+  std::optional<Refusal> refusal_of_change() const;
+  bool active() const { return run_ || steps_begun() || restoring_; }
   Applied applied(std::int64_t frame) const;
-  std::optional<Outcome> settle(Step& step) const;
+  std::optional<Outcome> settle(const Step& step) const;
 
   // of subscriptions
   Reading read(Subscription& subscription);
@@ -107,10 +173,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   bool release();  // with the mutex held
   void offer_to_all();
 
-  const std::string id_;
-  const std::string uid_;
-  const std::chrono::system_clock::time_point create_time_ = std::chrono::system_clock::now();
+  const SessionIdentity identity_;
   Scheduler& scheduler_;
+  const std::unique_ptr<SessionLog> log_;
   Simulation simulation_;                  // touched by the slice only
   Answers<Outcome> answers_{kMaxAnswers};  // touched by the slice only
   const Scene scene_;
@@ -128,6 +193,12 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   History history_;
   std::vector<Subscription*> subscriptions_;
   bool held_ = false;  // idle until a subscriber reads on
+  Writing writing_;
+  Reach reach_;                   // as it was written last
+  std::int64_t ahead_ = 16;       // frames that the reach is put ahead
+  Clock::time_point reach_time_;  // when it was
+  std::optional<Restoring> restoring_;
+  std::optional<PastHolders> past_holders_;
 };
 
 }  // namespace weft

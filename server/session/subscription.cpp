@@ -27,10 +27,16 @@ Progress Subscription::progress() const {
 std::unique_ptr<Subscription> Session::subscribe(std::weak_ptr<FrameSink> sink,
                                                  std::optional<std::int64_t> start,
                                                  SlowReader policy) {
-  std::lock_guard lock(mutex_);
+  std::unique_lock lock(mutex_);
   auto subscription = std::make_unique<Subscription>(shared_from_this(), std::move(sink),
                                                      start.value_or(latest()), policy);
   subscriptions_.push_back(subscription.get());
+  if (policy == SlowReader::kHoldSession && past_holders_ && --past_holders_->count == 0) {
+    past_holders_.reset();
+    const bool released = release();
+    lock.unlock();
+    if (released) wake();
+  }
   return subscription;
 }
 

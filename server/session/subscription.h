@@ -9,7 +9,7 @@ namespace weft {
 
 class Session;
 
-enum class SessionState { kPaused, kRunning, kFailed };
+enum class SessionState { kRestoring, kPaused, kRunning, kFailed };
 
 // What happens when a subscriber falls behind the frames that are kept: its subscription expires,
 // or the session waits for it.

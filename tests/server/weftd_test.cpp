@@ -21,7 +21,8 @@ class Weftd {
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
     std::string program = std::string(WEFT_BIN_DIR) + "/weftd", flag = "--port=" + port;
-    char* arguments[] = {program.data(), flag.data(), nullptr};
+    std::string keep = "--data-dir=none";
+    char* arguments[] = {program.data(), flag.data(), keep.data(), nullptr};
     EXPECT_EQ(posix_spawn(&process_, program.c_str(), &actions, nullptr, arguments, environ), 0);
     posix_spawn_file_actions_destroy(&actions);
     close(ends[1]);

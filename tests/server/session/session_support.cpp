@@ -38,7 +38,8 @@ Scene diverging_scene() {
 
 std::shared_ptr<Session> make_session(Scheduler& scheduler, const Scene& scene,
                                       std::size_t history_bytes, const std::string& id) {
-  return std::make_shared<Session>(id, Simulation(scene), history_bytes, scheduler);
+  return std::make_shared<Session>(make_identity(id, "test"), Simulation(scene), history_bytes,
+                                   scheduler, std::make_unique<NoLog>());
 }
 
 std::size_t history_of(std::size_t frames) {

@@ -1,0 +1,59 @@
+#include "server/rpc/restore.h"
+
+#include <spdlog/spdlog.h>
+
+#include <atomic>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/rpc/names.h"
+#include "server/rpc/server_service.h"
+
+namespace weft {
+namespace {
+
+void add_damaged(Backend& backend, const DamagedSession& damaged) {
+  spdlog::error("{} is damaged: {}", session_name(damaged.id), damaged.why);
+  backend.registry.restore(damaged.id, {damaged.uid, damaged.why});
+}
+
+void restore(Backend& backend, LeftSession left) {
+  const SessionIdentity& identity = left.session.identity;
+  Simulation simulation(std::move(left.session.scene));
+  if (simulation.refusal()) {
+    return add_damaged(backend, {identity.id, identity.uid, "this version cannot step its scene"});
+  }
+  if (identity.numerics_id != numerics_id()) {
+    spdlog::warn("{} was created with numerics {}; its frames may differ in their last bits now",
+                 session_name(identity.id), identity.numerics_id);
+  }
+  const auto session = std::make_shared<Session>(
+      identity, std::move(simulation),
+      static_cast<std::size_t>(backend.limits.history_bytes_per_session), backend.scheduler,
+      backend.store->log_of(identity.uid, left.past.log.size()));
+  backend.registry.restore(session);
+  session->restore(std::move(left.past));
+}
+
+}  // namespace
+
+void restore_sessions(Backend& backend) {
+  LeftBehind left = backend.store->load();
+  for (const auto& [request, uid] : left.requests) backend.requests.remember(request, uid);
+  for (const auto& damaged : left.damaged) add_damaged(backend, damaged);
+
+  std::atomic<std::size_t> next = 0;
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < backend.worker_threads; ++i) {
+    threads.emplace_back([&] {
+      for (std::size_t k = next++; k < left.sessions.size(); k = next++) {
+        restore(backend, std::move(left.sessions[k]));
+      }
+    });
+  }
+  threads.clear();  // joins
+  if (!left.sessions.empty()) spdlog::info("{} sessions restored", left.sessions.size());
+}
+
+}  // namespace weft

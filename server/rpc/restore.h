@@ -1,0 +1,11 @@
+#pragma once
+
+#include "server/rpc/backend.h"
+
+namespace weft {
+
+// Makes the sessions that the store has from an earlier process, on as many threads as there are
+// workers. They go on by themselves. Throws StoreError where the store cannot be read.
+void restore_sessions(Backend& backend);
+
+}  // namespace weft

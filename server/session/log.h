@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "core/model/textile.h"
+#include "server/session/request.h"
+
+// What is kept of a session, so that it can go on in another process: its frames follow from its
+// scene and the entries of its log.
+namespace weft {
+
+struct StepsBegun {
+  std::int64_t frames = 0;
+};
+struct StepsEnded {};  // before their last frame, by their caller
+struct RunBegun {
+  std::optional<double> time_scale;
+  std::optional<std::int64_t> until_frame;
+  bool until_rest = false;
+};
+struct Paused {};
+struct TextileSet {
+  std::size_t sheet = 0;
+  Textile textile;
+};
+using Event = std::variant<StepsBegun, StepsEnded, RunBegun, Paused, TextileSet>;
+
+// Something that was done to a session when `frame` was its newest.
+struct LogEntry {
+  std::int64_t frame = 0;
+  Request request;
+  Event event;
+};
+
+// How far frames may have been published, and which of them subscribers still need.
+struct Reach {
+  std::int64_t frame = 0;
+  int holders = 0;             // subscribers that the session waits for
+  std::int64_t held_from = 0;  // first frame that they need, where there are any
+};
+
+// Where the log of one session is written.
+class SessionLog {
+ public:
+  // Called once, from any thread: empty when what was written is safe, else why it is not there.
+  using Written = std::function<void(const std::string& error)>;
+
+  virtual ~SessionLog() = default;
+
+  // Adds the entry, if any, and replaces the reach. Writes follow each other in the order of calls.
+  virtual void write(const std::optional<LogEntry>& entry, const Reach& reach,
+                     const Written& written) = 0;
+};
+
+// Keeps nothing: the session ends with the process.
+class NoLog final : public SessionLog {
+ public:
+  void write(const std::optional<LogEntry>& /*entry*/, const Reach& /*reach*/,
+             const Written& written) override {
+    written({});
+  }
+};
+
+}  // namespace weft

@@ -1,0 +1,129 @@
+#include "server/store/records.h"
+
+#include <google/protobuf/util/time_util.h>
+
+#include "server/rpc/convert.h"
+#include "weft/storage/v1/storage.pb.h"
+
+namespace weft::records {
+namespace {
+
+namespace stored = storage::v1;
+using google::protobuf::util::TimeUtil;
+
+template <class Message>
+Message parse(const std::string& bytes) {
+  Message message;
+  if (!message.ParseFromString(bytes)) {
+    throw StoreError("no " + message.GetDescriptor()->full_name());
+  }
+  return message;
+}
+
+template <class Value>
+Value trusted(Converted<Value> converted) {
+  if (const auto* problems = std::get_if<std::vector<Problem>>(&converted)) {
+    throw StoreError(problems->front().field + ": " + problems->front().message);
+  }
+  return std::get<Value>(std::move(converted));
+}
+
+void set(stored::LogEntry* to, const StepsBegun& from) {
+  to->mutable_steps_begun()->set_frames(from.frames);
+}
+
+void set(stored::LogEntry* to, const StepsEnded&) { to->mutable_steps_ended(); }
+
+void set(stored::LogEntry* to, const RunBegun& from) {
+  stored::RunBegun* run = to->mutable_run_begun();
+  if (from.time_scale) run->set_time_scale(*from.time_scale);
+  if (from.until_frame) run->set_until_frame(*from.until_frame);
+  run->set_until_rest(from.until_rest);
+}
+
+void set(stored::LogEntry* to, const Paused&) { to->mutable_paused(); }
+
+void set(stored::LogEntry* to, const TextileSet& from) {
+  to->mutable_textile_set()->set_sheet(static_cast<std::int32_t>(from.sheet));
+  *to->mutable_textile_set()->mutable_textile() = as_given(from.textile);
+}
+
+RunBegun run_of(const stored::RunBegun& from) {
+  RunBegun run;
+  if (from.has_time_scale()) run.time_scale = from.time_scale();
+  if (from.has_until_frame()) run.until_frame = from.until_frame();
+  run.until_rest = from.until_rest();
+  return run;
+}
+
+Event event_of(const stored::LogEntry& from) {
+  switch (from.event_case()) {
+    case stored::LogEntry::kStepsBegun:
+      return StepsBegun{from.steps_begun().frames()};
+    case stored::LogEntry::kStepsEnded:
+      return StepsEnded{};
+    case stored::LogEntry::kRunBegun:
+      return run_of(from.run_begun());
+    case stored::LogEntry::kPaused:
+      return Paused{};
+    case stored::LogEntry::kTextileSet:
+      return TextileSet{static_cast<std::size_t>(from.textile_set().sheet()),
+                        trusted(to_textile(from.textile_set().textile(), "textile"))};
+    case stored::LogEntry::EVENT_NOT_SET:
+      break;
+  }
+  throw StoreError("an entry of its log that this version does not know");
+}
+
+}  // namespace
+
+std::string encode(const KeptSession& session) {
+  stored::KeptSession to;
+  to.set_id(session.identity.id);
+  to.set_uid(session.identity.uid);
+  to.set_numerics_id(session.identity.numerics_id);
+  const auto since_epoch = session.identity.create_time.time_since_epoch();
+  *to.mutable_create_time() = TimeUtil::NanosecondsToTimestamp(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count());
+  *to.mutable_scene() = as_given(session.scene);
+  return to.SerializeAsString();
+}
+
+std::string encode(const Progress& progress) {
+  stored::KeptProgress to;
+  to.set_entries(progress.entries);
+  to.set_frame(progress.reach.frame);
+  to.set_holders(progress.reach.holders);
+  to.set_held_from(progress.reach.held_from);
+  return to.SerializeAsString();
+}
+
+std::string encode(const LogEntry& entry) {
+  stored::LogEntry to;
+  to.set_frame(entry.frame);
+  to.set_request_id(entry.request.id);
+  to.set_request_checksum(entry.request.checksum);
+  std::visit([&](const auto& event) { set(&to, event); }, entry.event);
+  return to.SerializeAsString();
+}
+
+KeptSession decode_session(const std::string& bytes) {
+  const auto from = parse<stored::KeptSession>(bytes);
+  const std::chrono::nanoseconds created(TimeUtil::TimestampToNanoseconds(from.create_time()));
+  return {{from.id(), from.uid(), from.numerics_id(),
+           std::chrono::system_clock::time_point(
+               std::chrono::duration_cast<std::chrono::system_clock::duration>(created))},
+          trusted(to_scene(from.scene(), "scene"))};
+}
+
+Progress decode_progress(const std::string& bytes) {
+  const auto from = parse<stored::KeptProgress>(bytes);
+  return {from.entries(), {from.frame(), from.holders(), from.held_from()}};
+}
+
+LogEntry decode_entry(const std::string& bytes) {
+  const auto from = parse<stored::LogEntry>(bytes);
+  return {from.frame(), {from.request_id(), from.request_checksum()}, event_of(from)};
+}
+
+}  // namespace weft::records

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "server/store/store.h"
+
+// What is kept, as bytes (weft.storage.v1). Decoding throws StoreError for bytes that say nothing
+// which this version understands.
+namespace weft::records {
+
+struct Progress {
+  std::int64_t entries = 0;
+  Reach reach;
+};
+
+std::string encode(const KeptSession& session);
+std::string encode(const Progress& progress);
+std::string encode(const LogEntry& entry);
+
+KeptSession decode_session(const std::string& bytes);
+Progress decode_progress(const std::string& bytes);
+LogEntry decode_entry(const std::string& bytes);
+
+}  // namespace weft::records

@@ -1,0 +1,366 @@
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Statement.h>
+#include <SQLiteCpp/Transaction.h>
+#include <spdlog/spdlog.h>
+#include <sqlite3.h>
+#include <zlib.h>
+
+#include <condition_variable>
+#include <deque>
+#include <filesystem>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "server/store/records.h"
+
+namespace weft {
+namespace {
+
+constexpr int kApplicationId = 0x57454644;  // "WEFD"
+constexpr int kVersion = 1;                 // user_version of the file
+constexpr int kMostRequests = 10'000;
+constexpr const char* kTables = R"(
+  CREATE TABLE session (
+    uid TEXT PRIMARY KEY,
+    id TEXT NOT NULL,
+    record BLOB NOT NULL,        -- weft.storage.v1.KeptSession
+    checksum INTEGER NOT NULL);  -- CRC-32 of uid and record
+  CREATE TABLE progress (
+    uid TEXT PRIMARY KEY,
+    record BLOB NOT NULL,        -- weft.storage.v1.KeptProgress
+    checksum INTEGER NOT NULL);  -- CRC-32 of uid and record
+  CREATE TABLE entry (
+    uid TEXT NOT NULL,
+    number INTEGER NOT NULL,     -- 0, 1, 2 ... within its session
+    record BLOB NOT NULL,        -- weft.storage.v1.LogEntry
+    checksum INTEGER NOT NULL,   -- CRC-32 of uid, number and record
+    PRIMARY KEY (uid, number)) WITHOUT ROWID;
+  CREATE TABLE request (
+    number INTEGER PRIMARY KEY,
+    id TEXT NOT NULL,
+    checksum INTEGER NOT NULL,   -- of the call
+    uid TEXT NOT NULL);
+)";
+
+std::int64_t checksum(const std::string& key, const std::string& record) {
+  const auto bytes = [](const std::string& text) {
+    return reinterpret_cast<const Bytef*>(text.data());
+  };
+  return static_cast<std::int64_t>(
+      crc32_z(crc32_z(0, bytes(key), key.size()), bytes(record), record.size()));
+}
+
+std::string entry_key(const std::string& uid, std::int64_t number) {
+  return uid + "/" + std::to_string(number);
+}
+
+std::string make_path(const std::string& directory) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const bool made = fs::create_directories(directory, error);
+  if (made) fs::permissions(directory, fs::perms::owner_all, error);
+  if (error || !fs::is_directory(directory)) {
+    throw StoreError(directory + " is no directory for sessions" +
+                     (error ? ": " + error.message() : ""));
+  }
+  return (fs::path(directory) / "sessions.db").string();
+}
+
+// What went wrong, in the words of a user.
+std::string text_of(const std::string& path, const SQLite::Exception& error) {
+  switch (error.getErrorCode()) {
+    case SQLITE_FULL:
+      return path + ": the disk is full";
+    case SQLITE_READONLY:
+    case SQLITE_IOERR:
+      return path + " cannot be written: " + error.what();
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return path + " is used by another weftd; give this one another --data-dir";
+    case SQLITE_NOTADB:
+      return path + " holds no sessions of weftd";
+    default:
+      return path + ": " + error.what();
+  }
+}
+
+std::string blob(SQLite::Column column) {
+  return {static_cast<const char*>(column.getBlob()), static_cast<std::size_t>(column.getBytes())};
+}
+
+// One connection and one thread that writes; what comes while it commits is committed together.
+class SqliteStore final : public SessionStore {
+ public:
+  explicit SqliteStore(const std::string& directory)
+      : path_(make_path(directory)), database_(open(path_)), thread_([this] { work(); }) {}
+
+  ~SqliteStore() override {
+    {
+      std::lock_guard lock(mutex_);
+      stopping_ = true;
+      changed_.notify_all();
+    }
+    thread_.join();
+  }
+
+  LeftBehind load() override;
+  void add(const KeptSession& session, const Request& creation) override;
+  std::unique_ptr<SessionLog> log_of(const std::string& uid, std::size_t entries) override;
+  void erase(const std::string& uid, const Request& deletion,
+             const SessionLog::Written& written) override;
+
+ private:
+  class Log;
+  using Work = std::function<void(SQLite::Database&)>;
+  struct Job {
+    Work work;
+    SessionLog::Written written;
+  };
+
+  static SQLite::Database open(const std::string& path);
+  static void keep_request(SQLite::Database& database, const Request& request,
+                           const std::string& uid);
+  LeftSession load_session(const std::string& uid, const std::string& record);
+  void post(Work work, SessionLog::Written written);
+  void work();
+  std::string commit(const std::deque<Job>& jobs);
+
+  const std::string path_;
+  SQLite::Database database_;  // used by load(), then by the thread alone
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Job> jobs_;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+SQLite::Database SqliteStore::open(const std::string& path) try {
+  SQLite::Database database(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+  // one process at a time; every commit reaches the disk
+  database.exec("PRAGMA locking_mode = EXCLUSIVE");
+  database.exec("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+  database.exec("BEGIN EXCLUSIVE");
+  const int application = database.execAndGet("PRAGMA application_id").getInt();
+  const int version = database.execAndGet("PRAGMA user_version").getInt();
+  if (application == 0 && version == 0) {
+    database.exec(kTables);
+    database.exec("PRAGMA application_id = " + std::to_string(kApplicationId));
+    database.exec("PRAGMA user_version = " + std::to_string(kVersion));
+  } else if (application != kApplicationId) {
+    throw StoreError(path + " holds no sessions of weftd");
+  } else if (version != kVersion) {
+    throw StoreError(path + " was made by another version of weftd");
+  }
+  database.exec("COMMIT");
+  return database;
+} catch (const SQLite::Exception& error) {
+  throw StoreError(text_of(path, error));
+}
+
+LeftBehind SqliteStore::load() try {
+  LeftBehind left;
+  SQLite::Statement request(database_, "SELECT id, checksum, uid FROM request ORDER BY number");
+  while (request.executeStep()) {
+    left.requests.push_back({{request.getColumn(0).getString(),
+                              static_cast<std::uint32_t>(request.getColumn(1).getInt64())},
+                             request.getColumn(2).getString()});
+  }
+  SQLite::Statement row(database_, "SELECT uid, id, record, checksum FROM session ORDER BY id");
+  while (row.executeStep()) {
+    const std::string uid = row.getColumn(0).getString();
+    const std::string id = row.getColumn(1).getString();
+    try {
+      const std::string record = blob(row.getColumn(2));
+      if (row.getColumn(3).getInt64() != checksum(uid, record)) {
+        throw StoreError("the checksum of its scene is wrong");
+      }
+      LeftSession session = load_session(uid, record);
+      const SessionIdentity& identity = session.session.identity;
+      if (identity.id != id || identity.uid != uid) throw StoreError("it has another name");
+      left.sessions.push_back(std::move(session));
+    } catch (const StoreError& error) {
+      left.damaged.push_back({id, uid, error.what()});
+    } catch (const SQLite::Exception& error) {
+      left.damaged.push_back({id, uid, error.what()});
+    }
+  }
+  return left;
+} catch (const SQLite::Exception& error) {
+  throw StoreError(text_of(path_, error));
+}
+
+LeftSession SqliteStore::load_session(const std::string& uid, const std::string& record) {
+  LeftSession left{records::decode_session(record), {}};
+  SQLite::Statement progress_row(database_, "SELECT record, checksum FROM progress WHERE uid = ?");
+  progress_row.bind(1, uid);
+  if (!progress_row.executeStep()) throw StoreError("it does not say how far it came");
+  const std::string bytes = blob(progress_row.getColumn(0));
+  if (progress_row.getColumn(1).getInt64() != checksum(uid, bytes)) {
+    throw StoreError("the checksum of how far it came is wrong");
+  }
+  const records::Progress progress = records::decode_progress(bytes);
+  left.past.reach = progress.reach;
+
+  SQLite::Statement row(database_,
+                        "SELECT number, record, checksum FROM entry WHERE uid = ? ORDER BY number");
+  row.bind(1, uid);
+  std::int64_t next = 0;
+  for (; row.executeStep(); ++next) {
+    const std::string entry = blob(row.getColumn(1));
+    const bool sound = row.getColumn(0).getInt64() == next &&
+                       row.getColumn(2).getInt64() == checksum(entry_key(uid, next), entry);
+    if (!sound) {
+      throw StoreError("entry " + std::to_string(next) +
+                       " of its log is missing, or its checksum is wrong");
+    }
+    left.past.log.push_back(records::decode_entry(entry));
+    const auto frame = left.past.log.back().frame;
+    const auto before = next == 0 ? 0 : left.past.log[static_cast<std::size_t>(next) - 1].frame;
+    if (frame < before) throw StoreError("its log is out of order");
+  }
+  if (next != progress.entries) throw StoreError("its log has lost its end");
+  return left;
+}
+
+void SqliteStore::add(const KeptSession& session, const Request& creation) {
+  std::promise<std::string> done;
+  const std::string& uid = session.identity.uid;
+  post(
+      [&, record = records::encode(session),
+       progress = records::encode(records::Progress{})](SQLite::Database& database) {
+        SQLite::Statement insert(database, "INSERT INTO session VALUES (?, ?, ?, ?)");
+        insert.bind(1, uid);
+        insert.bind(2, session.identity.id);
+        insert.bind(3, record.data(), static_cast<int>(record.size()));
+        insert.bind(4, checksum(uid, record));
+        insert.exec();
+        SQLite::Statement begin(database, "INSERT INTO progress VALUES (?, ?, ?)");
+        begin.bind(1, uid);
+        begin.bind(2, progress.data(), static_cast<int>(progress.size()));
+        begin.bind(3, checksum(uid, progress));
+        begin.exec();
+        keep_request(database, creation, uid);
+      },
+      [&](const std::string& error) { done.set_value(error); });
+  const std::string error = done.get_future().get();
+  if (!error.empty()) throw StoreError(error);
+}
+
+void SqliteStore::erase(const std::string& uid, const Request& deletion,
+                        const SessionLog::Written& written) {
+  post(
+      [uid, deletion](SQLite::Database& database) {
+        for (const char* table : {"session", "progress", "entry"}) {
+          SQLite::Statement erase(database, std::string("DELETE FROM ") + table + " WHERE uid = ?");
+          erase.bind(1, uid);
+          erase.exec();
+        }
+        keep_request(database, deletion, uid);
+      },
+      written);
+}
+
+void SqliteStore::keep_request(SQLite::Database& database, const Request& request,
+                               const std::string& uid) {
+  if (request.id.empty()) return;
+  SQLite::Statement insert(database, "INSERT INTO request (id, checksum, uid) VALUES (?, ?, ?)");
+  insert.bind(1, request.id);
+  insert.bind(2, static_cast<std::int64_t>(request.checksum));
+  insert.bind(3, uid);
+  insert.exec();
+  SQLite::Statement trim(database, "DELETE FROM request WHERE number <= ?");
+  trim.bind(1, database.getLastInsertRowid() - kMostRequests);
+  trim.exec();
+}
+
+class SqliteStore::Log final : public SessionLog {
+ public:
+  Log(SqliteStore& store, std::string uid, std::int64_t entries)
+      : store_(store), uid_(std::move(uid)), entries_(std::make_shared<std::int64_t>(entries)) {}
+
+  void write(const std::optional<LogEntry>& entry, const Reach& reach,
+             const Written& written) override {
+    // the count is the writing thread's own
+    const auto record = entry ? std::optional(records::encode(*entry)) : std::nullopt;
+    store_.post(
+        [record, reach, uid = uid_, entries = entries_](SQLite::Database& database) {
+          const records::Progress progress{*entries + (record ? 1 : 0), reach};
+          if (replace(database, uid, records::encode(progress)) && record) {
+            add(database, uid, *entries, *record);
+          }
+        },
+        [entries = entries_, added = record.has_value(), written](const std::string& error) {
+          if (error.empty() && added) ++*entries;
+          written(error);
+        });
+  }
+
+ private:
+  // False where the session was deleted.
+  static bool replace(SQLite::Database& database, const std::string& uid,
+                      const std::string& progress) {
+    SQLite::Statement update(database,
+                             "UPDATE progress SET record = ?, checksum = ? WHERE uid = ?");
+    update.bind(1, progress.data(), static_cast<int>(progress.size()));
+    update.bind(2, checksum(uid, progress));
+    update.bind(3, uid);
+    return update.exec() == 1;
+  }
+  static void add(SQLite::Database& database, const std::string& uid, std::int64_t number,
+                  const std::string& record) {
+    SQLite::Statement insert(database, "INSERT INTO entry VALUES (?, ?, ?, ?)");
+    insert.bind(1, uid);
+    insert.bind(2, number);
+    insert.bind(3, record.data(), static_cast<int>(record.size()));
+    insert.bind(4, checksum(entry_key(uid, number), record));
+    insert.exec();
+  }
+
+  SqliteStore& store_;
+  const std::string uid_;
+  const std::shared_ptr<std::int64_t> entries_;  // of the log
+};
+
+std::unique_ptr<SessionLog> SqliteStore::log_of(const std::string& uid, std::size_t entries) {
+  return std::make_unique<Log>(*this, uid, static_cast<std::int64_t>(entries));
+}
+
+void SqliteStore::post(Work work, SessionLog::Written written) {
+  std::lock_guard lock(mutex_);
+  jobs_.push_back({std::move(work), std::move(written)});
+  changed_.notify_one();
+}
+
+void SqliteStore::work() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
+    if (jobs_.empty()) return;
+    const auto jobs = std::exchange(jobs_, {});
+    lock.unlock();
+    const std::string error = commit(jobs);
+    for (const auto& job : jobs) job.written(error);
+    lock.lock();
+  }
+}
+
+// What kept all of them from being written, if anything.
+std::string SqliteStore::commit(const std::deque<Job>& jobs) try {
+  SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
+  for (const auto& job : jobs) job.work(database_);
+  transaction.commit();
+  return {};
+} catch (const SQLite::Exception& error) {
+  spdlog::error("{}", text_of(path_, error));
+  return text_of(path_, error);
+}
+
+}  // namespace
+
+std::unique_ptr<SessionStore> open_sqlite_store(const std::string& directory) {
+  return std::make_unique<SqliteStore>(directory);
+}
+
+}  // namespace weft

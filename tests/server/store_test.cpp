@@ -1,0 +1,270 @@
+#include <stdlib.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "tests/support/service/service.h"
+
+namespace weft::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+using Sessions = Service::Sessions;
+
+// A directory with sessions in it, and servers that take them over from each other.
+class Restart : public ::testing::Test {
+ protected:
+  Restart() {
+    std::string name = (std::filesystem::temp_directory_path() / "weft-XXXXXX").string();
+    directory_ = mkdtemp(name.data());
+    start();
+  }
+  ~Restart() override {
+    service_.reset();
+    std::filesystem::remove_all(directory_);
+  }
+
+  void start() {
+    ServerOptions options = Service::in_process();
+    options.data_dir = directory_;
+    service_ = std::make_unique<Service>(options);
+  }
+  void restart() {
+    service_.reset();
+    start();
+  }
+
+  // All frames up to the one given, which there may have to be waited for.
+  std::vector<v1::Frame> frames(const v1::Session& session, std::int64_t last) {
+    return Stream(*service_, frames_of(session, 0, last)).rest();
+  }
+  static void expect_equal(const std::vector<v1::Frame>& found,
+                           const std::vector<v1::Frame>& wanted) {
+    ASSERT_EQ(found.size(), wanted.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      ASSERT_EQ(found[i].SerializeAsString(), wanted[i].SerializeAsString()) << "frame " << i;
+    }
+  }
+
+  void set_preset(const v1::Session& session, const std::string& preset) {
+    v1::UpdateTextileRequest request;
+    request.set_name(session.name());
+    request.mutable_textile()->set_preset(preset);
+    ASSERT_EQ(service_->error(&Sessions::UpdateTextile, request).code, grpc::StatusCode::OK);
+  }
+
+  std::string file() const { return directory_ + "/sessions.db"; }
+
+  std::string directory_;
+  std::unique_ptr<Service> service_;
+};
+
+TEST_F(Restart, HasEverySessionWhereItWasWithTheSameFrames) {
+  v1::Scene windy = small_scene();
+  windy.mutable_environment()->mutable_wind()->mutable_velocity_m_per_s()->set_x(3);
+  windy.mutable_sheets(0)->mutable_placement()->mutable_rotation()->set_w(0.6);
+  windy.mutable_sheets(0)->mutable_placement()->mutable_rotation()->set_x(0.8);
+  for (const auto& scene : {small_scene(), windy}) {
+    const v1::Session session = service_->create(scene);
+    service_->step(session, 10);
+    set_preset(session, "denim_11oz");
+    service_->step(session, 5);
+    set_preset(session, "wool_tropical");
+    service_->run(session, 40);
+    const auto before = frames(session, 40);
+    const v1::Session shown = service_->get(session);
+    restart();
+    expect_equal(frames(session, 40), before);
+    service_->step(session, 1);
+    service_->erase(session);
+    EXPECT_EQ(shown.uid(), session.uid());
+  }
+}
+
+TEST_F(Restart, ShowsSessionsAsTheyWere) {
+  const v1::Session session = service_->create(small_scene(), "curtain");
+  service_->step(session, 7);
+  set_preset(session, "denim_11oz");
+  const v1::Session before = service_->get(session);
+  restart();
+  service_->pause(session);  // waits until it is restored
+  EXPECT_EQ(service_->get(session).SerializeAsString(), before.SerializeAsString());
+}
+
+TEST_F(Restart, FindsDeletedSessionsDeleted) {
+  const v1::Session session = service_->create(small_scene(), "curtain");
+  service_->step(session, 3);
+  service_->erase(session);
+  restart();
+  EXPECT_EQ(service_->info().sessions(), 0);
+  EXPECT_EQ(service_->get(service_->create(small_scene(), "curtain")).frame(), 0);
+}
+
+TEST_F(Restart, LetsARunGoOnAndAPauseLast) {
+  const v1::Session running = service_->create(), paused = service_->create();
+  service_->run(running, 1'000'000'000);
+  service_->run(paused, 1'000'000'000);
+  Stream(*service_, frames_of(running, 0, 50)).rest();
+  const std::int64_t at = service_->pause(paused).applied_frame() - 1;
+  restart();
+  Stream(*service_, frames_of(running, 0, 100)).rest();
+  EXPECT_EQ(service_->pause(paused).applied_frame() - 1, at);
+}
+
+TEST_F(Restart, FinishesAStepAndAnswersItsCallerOnce) {
+  const v1::Session session = service_->create();
+  v1::StepSessionRequest request;
+  request.set_name(session.name());
+  request.set_frames(3000);
+  request.set_request_id("step");
+  std::jthread([&] {
+    EXPECT_EQ(service_->error(&Sessions::StepSession, request).reason(), "SERVER_DRAINING");
+  }).detach();
+  Stream(*service_, frames_of(session, 0, 5)).rest();
+  service_->server.stop();
+  restart();
+  v1::StepSessionResponse response;
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(service_->call(&Sessions::StepSession, request, &response).ok());
+    EXPECT_EQ(response.applied_frame(), 1);
+    EXPECT_EQ(response.frame(), 3000);
+  }
+}
+
+TEST_F(Restart, RemembersNamedCreationsAndDeletions) {
+  v1::CreateSessionRequest create;
+  *create.mutable_session()->mutable_scene() = small_scene();
+  create.set_request_id("create");
+  v1::Session first, again;
+  ASSERT_TRUE(service_->call(&Sessions::CreateSession, create, &first).ok());
+  restart();
+  ASSERT_TRUE(service_->call(&Sessions::CreateSession, create, &again).ok());
+  EXPECT_EQ(again.uid(), first.uid());
+  v1::DeleteSessionRequest erase;
+  erase.set_name(first.name());
+  erase.set_request_id("delete");
+  EXPECT_EQ(service_->error(&Sessions::DeleteSession, erase).code, grpc::StatusCode::OK);
+  restart();
+  EXPECT_EQ(service_->error(&Sessions::DeleteSession, erase).code, grpc::StatusCode::OK);
+  EXPECT_EQ(service_->info().sessions(), 0);
+}
+
+TEST_F(Restart, KeepsAFailedSessionFailed) {
+  const v1::Session session = service_->create(diverging_scene());
+  service_->run(session, 1000);
+  Stream(*service_, frames_of(session)).finish();
+  const v1::Session before = service_->get(session);
+  EXPECT_EQ(before.state(), v1::SESSION_STATE_FAILED);
+  restart();
+  Stream(*service_, frames_of(session)).finish();
+  EXPECT_EQ(service_->get(session).SerializeAsString(), before.SerializeAsString());
+}
+
+TEST_F(Restart, HoldsFramesForAReaderThatComesBack) {
+  ServerOptions options = Service::in_process();
+  options.data_dir = directory_;
+  options.limits.history_bytes_per_session = 50'000;  // some 30 frames
+  service_.reset();
+  service_ = std::make_unique<Service>(options);
+  const v1::Session session = service_->create();
+  auto request = frames_of(session, 0, 500);
+  request.set_slow_reader(v1::SLOW_READER_HOLD_SESSION);
+  std::vector<v1::Frame> before;
+  {
+    Stream stream(*service_, request);
+    service_->run(session, 500);
+    while (before.size() < 100) before.push_back(stream.frame());
+    service_.reset();
+  }
+  service_ = std::make_unique<Service>(options);
+  request.set_start_frame(100);
+  Stream stream(*service_, request);
+  const auto after = stream.rest();
+  EXPECT_EQ(stream.finish().message, "");
+  ASSERT_THAT(after, SizeIs(401));
+  EXPECT_EQ(after.front().number(), 100);
+}
+
+TEST_F(Restart, RefusesADirectoryInUse) {
+  ServerOptions options = Service::in_process();
+  options.data_dir = directory_;
+  try {
+    const Server second(options);
+    ADD_FAILURE() << "it serves";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("is used by another weftd"));
+  }
+}
+
+std::string content(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+TEST_F(Restart, LosesOnlyTheSessionThatIsDamaged) {
+  v1::Scene scene = small_scene();
+  const v1::Session good = service_->create(scene, "good");
+  scene.mutable_sheets(0)->set_name("treacherous");
+  const v1::Session bad = service_->create(scene, "bad");
+  service_->step(good, 5);
+  service_->step(bad, 5);
+  service_.reset();
+  std::string bytes = content(file());
+  const auto place = bytes.find("treacherous");
+  ASSERT_NE(place, std::string::npos);
+  bytes[place] = 'T';
+  std::ofstream(file(), std::ios::binary) << bytes;
+
+  start();
+  EXPECT_EQ(service_->step(good).frame(), 6);
+  v1::GetSessionRequest get;
+  get.set_name(bad.name());
+  const Error error = service_->error(&Sessions::GetSession, get);
+  EXPECT_EQ(error.code, grpc::StatusCode::DATA_LOSS);
+  EXPECT_EQ(error.reason(), "SESSION_DAMAGED");
+  EXPECT_EQ(service_->create_error(small_scene(), "bad").code, grpc::StatusCode::ALREADY_EXISTS);
+  service_->erase(bad);
+  restart();
+  EXPECT_EQ(service_->error(&Sessions::GetSession, get).code, grpc::StatusCode::NOT_FOUND);
+  EXPECT_EQ(service_->step(good).frame(), 7);
+}
+
+// Whatever byte is changed: the server refuses the file, or has the session as it was, or says that
+// it is damaged.
+TEST_F(Restart, NeverMistakesDamageForASession) {
+  const v1::Session session = service_->create(small_scene(), "curtain");
+  for (int i = 0; i < 5; ++i) service_->step(session, 2);
+  const std::string before = frames(session, 10).back().SerializeAsString();
+  service_.reset();
+  const std::string good = content(file());
+  int found = 0;
+  for (std::size_t place = 3; place < good.size(); place += 401) {
+    std::string bytes = good;
+    bytes[place] = static_cast<char>(bytes[place] ^ 0x11);
+    std::ofstream(file(), std::ios::binary) << bytes;
+    try {
+      start();
+      v1::GetSessionRequest get;
+      get.set_name(session.name());
+      const Error error = service_->error(&Sessions::GetSession, get);
+      if (error.code == grpc::StatusCode::OK) {
+        EXPECT_EQ(frames(session, 10).back().SerializeAsString(), before) << "byte " << place;
+      } else {
+        EXPECT_EQ(error.code, grpc::StatusCode::DATA_LOSS) << "byte " << place;
+        ++found;
+      }
+    } catch (const std::runtime_error&) {
+      ++found;
+    }
+    service_.reset();
+  }
+  EXPECT_GT(found, 0);
+}
+
+}  // namespace
+}  // namespace weft::testing

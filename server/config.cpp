@@ -111,7 +111,7 @@ std::string default_data_dir() {
     const char* value = std::getenv(name);
     return std::string(value == nullptr ? "" : value);
   };
-  if (const auto state = variable("STATE_DIRECTORY"); !state.empty()) return state;
+  if (auto state = variable("STATE_DIRECTORY"); !state.empty()) return state;
   if (const auto state = variable("XDG_STATE_HOME"); !state.empty()) return state + "/weft";
   if (const auto home = variable("HOME"); !home.empty()) return home + "/.local/state/weft";
   return "/var/lib/weft";

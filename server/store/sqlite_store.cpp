@@ -161,6 +161,9 @@ SQLite::Database SqliteStore::open(const std::string& path) try {
 
 LeftBehind SqliteStore::load() try {
   LeftBehind left;
+  // a page may lose a session whole, and nothing of it is left to be told apart
+  const std::string state = database_.execAndGet("PRAGMA quick_check(1)").getString();
+  if (state != "ok") spdlog::error("{} is damaged, sessions may be missing: {}", path_, state);
   SQLite::Statement request(database_, "SELECT id, checksum, uid FROM request ORDER BY number");
   while (request.executeStep()) {
     left.requests.push_back({{request.getColumn(0).getString(),

@@ -12,6 +12,8 @@ namespace weft::testing {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 TEST(Server, TellsItsVersionAndLimits) {
@@ -208,10 +210,17 @@ TEST(Config, RefusesToListenBeyondThisMachineUnlessToldTwice) {
   EXPECT_EQ(config({"--host", "0.0.0.0", "--insecure"}).server.host, "0.0.0.0");
 }
 
+TEST(Config, KeepsSessionsUnlessToldNotTo) {
+  EXPECT_THAT(config({}).server.data_dir.value_or(""), Not(IsEmpty()));
+  EXPECT_EQ(config({"--data-dir", "/var/cloth"}).server.data_dir, "/var/cloth");
+  EXPECT_EQ(config({"--data-dir", "none"}).server.data_dir, std::nullopt);
+  EXPECT_THAT(refusal({"--data-dir", ""}), HasSubstr("data_dir is empty"));
+}
+
 TEST(Config, HelpsWithEveryFlag) {
   const std::string help = refusal({"--help"});
   for (const char* flag :
-       {"--host", "--port", "--config", "--insecure", "--workers", "--max-sessions",
+       {"--host", "--port", "--config", "--data-dir", "--insecure", "--workers", "--max-sessions",
         "--max-particles", "--max-streams", "--history-bytes", "--log-level"}) {
     EXPECT_THAT(help, HasSubstr(flag));
   }

@@ -243,7 +243,7 @@ TEST_F(Restart, NeverMistakesDamageForASession) {
   service_.reset();
   const std::string good = content(file());
   int found = 0;
-  for (std::size_t place = 3; place < good.size(); place += 401) {
+  for (std::size_t place = 3; place < good.size(); place += 173) {
     std::string bytes = good;
     bytes[place] = static_cast<char>(bytes[place] ^ 0x11);
     std::ofstream(file(), std::ios::binary) << bytes;

@@ -137,9 +137,7 @@ Config read_config(int argc, const char* const* argv) {
       ->type_name("FILE");
   app.add_option("--host", host, "Address to listen on [" + *config.server.host + "]")
       ->type_name("ADDRESS");
-  app.add_option("--data-dir", data_dir,
-                 "Directory where sessions are kept over restarts, or none [" +
-                     *config.server.data_dir + "]")
+  app.add_option("--data-dir", data_dir, "Directory that keeps sessions, or none")
       ->type_name("DIR");
   app.add_flag("--insecure", insecure, "Allow a host other machines can reach, unencrypted");
   app.add_option("--log-level", log_level, "trace, debug, info, warn, error or off [info]")
@@ -155,7 +153,8 @@ Config read_config(int argc, const char* const* argv) {
   }
   app.footer(
       "Prints \"weftd listening on ADDRESS:PORT\" when it serves; logs to stderr. SIGTERM or\n"
-      "SIGINT ends every stream and call and exits with 0.");
+      "SIGINT ends every stream and call and exits with 0. Sessions are kept, unless told\n"
+      "otherwise, in $STATE_DIRECTORY, $XDG_STATE_HOME/weft or ~/.local/state/weft.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

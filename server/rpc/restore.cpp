@@ -53,7 +53,7 @@ void restore_sessions(Backend& backend) {
     });
   }
   threads.clear();  // joins
-  if (!left.sessions.empty()) spdlog::info("{} sessions restored", left.sessions.size());
+  if (!left.sessions.empty()) spdlog::info("sessions restored: {}", left.sessions.size());
 }
 
 }  // namespace weft

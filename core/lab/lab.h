@@ -1,0 +1,58 @@
+#pragma once
+
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "core/model/scene.h"
+
+namespace weft {
+
+// What a textile is put to, each a test with an answer from a textbook.
+enum class LabTest {
+  kTensile,     // a strip pulled by 1 %: its modulus
+  kShear,       // a frame sheared by 1 degree: its modulus
+  kBending,     // the bending curve of a connection: f_b, f_b*, the evaluator's, and its error
+  kCantilever,  // ASTM D1388: a strip over an edge hangs at 41.5 degrees
+  kChain,       // threads without bending between two hooks: an elastic catenary
+};
+
+struct LabOrder {
+  LabTest test = LabTest::kCantilever;
+  MeasuredTextile textile;
+  BendingLaw bending;
+  bool weft = false;             // the specimen is cut along the weft
+  std::vector<double> spacings;  // h, m; empty: a range that the test chooses
+};
+
+// A figure that was asked for and what the model made of it, at one resolution.
+struct LabValue {
+  std::string quantity;
+  std::string unit;
+  double spacing = 0;  // m
+  int particles = 0;
+  double asked = 0;
+  double found = 0;
+};
+
+// Rows of numbers under names with units: "r", "f_b N".
+struct LabCurve {
+  std::string name;
+  std::vector<std::string> columns;
+  std::vector<std::vector<double>> rows;
+};
+
+struct LabReport {
+  std::string method;  // the specimen, and where `asked` comes from
+  std::vector<LabValue> values;
+  std::vector<LabCurve> curves;
+  std::vector<std::string> notes;  // where the model is wrong about cloth
+};
+
+// Everything that keeps a test from being run; empty for a good one. Fields as in RunTestRequest.
+std::vector<Problem> find_problems(const LabOrder& order);
+
+// Precondition: find_problems(order) is empty. On a stop it ends early, with what it has.
+LabReport run_lab(const LabOrder& order, const std::stop_token& stop = {});
+
+}  // namespace weft

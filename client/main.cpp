@@ -1,3 +1,4 @@
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -29,6 +30,8 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error to report
   std::stop_source stop;
   std::thread(wait_for_signals, signals, stop).detach();
+
+  spdlog::set_level(spdlog::level::off);  // an embedded server says it in its answers
 
   const weft::client::Terminal terminal{std::cout, std::cerr, isatty(STDOUT_FILENO) == 1,
                                         isatty(STDERR_FILENO) == 1};

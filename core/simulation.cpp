@@ -7,6 +7,7 @@
 #include "core/contact/contact.h"
 #include "core/forces/air.h"
 #include "core/forces/springs.h"
+#include "core/motion/guard.h"
 #include "core/motion/sheet_solver.h"
 
 namespace weft {
@@ -17,9 +18,31 @@ struct Sheet {
   Mesh mesh;
   Dynamics dynamics;  // the forces in double
   std::unique_ptr<SheetSolver> solver;
-  Matrix3Xd start;       // positions that paths are relative to, m
-  Matrix3Xd velocities;  // of the frame before, m/s; empty at first
-  double skin = 0;       // m
+  Matrix3Xd start;  // positions that paths are relative to, m
+  SheetState good;  // at the end of the last frame
+  SheetState next;  // at the end of the one that is being computed
+  double skin = 0;  // m
+  double most_strain = kMostStrain;
+
+  void read(SheetState& state) const {
+    solver->positions(state.x);
+    solver->velocities(state.v);
+    state.kinetic_energy = kinetic_energy(mesh, state.v);
+  }
+};
+
+// What the guard says of an attempt at a frame.
+struct Attempt {
+  std::vector<Verdict> sheets;
+  std::string reason;  // the first of theirs; empty: the frame is good
+  int halvings = 0;
+
+  // Whether every sheet that is in doubt does here as it did there.
+  bool confirms(const Attempt& other) const {
+    for (std::size_t s = 0; s < sheets.size(); ++s)
+      if (!sheets[s].reason.empty() && !weft::confirms(sheets[s], other.sheets[s])) return false;
+    return true;
+  }
 };
 
 // Held particles go where their paths lead.
@@ -44,13 +67,6 @@ void set_textile_of(const Scene& scene, const SheetDefinition& definition, Sheet
   sheet.skin = definition.skin.value_or(definition.grid.spacing / 10);
 }
 
-std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefinition& definition,
-                                         const Dynamics& dynamics) {
-  if (!needs_plain_solver(scene, definition).empty())
-    return make_plain_solver(dynamics, scene.solver.integrator);
-  return make_lattice_solver(definition, dynamics, scene.solver);
-}
-
 // When the last path ends, s.
 double end_of_paths(const Scene& scene) {
   double end = 0;
@@ -65,19 +81,33 @@ double end_of_paths(const Scene& scene) {
 
 }  // namespace
 
+std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefinition& sheet,
+                                         const Dynamics& dynamics) {
+  if (!needs_plain_solver(scene, sheet).empty())
+    return make_plain_solver(dynamics, scene.solver.integrator);
+  return make_lattice_solver(sheet, dynamics, scene.solver);
+}
+
 struct Simulation::State {
   Scene scene;
+  SolverFactory make_solver;
   Plan plan;
   std::vector<Sheet> sheets;
   std::int64_t frame = 0;
   int frames_at_rest = 0;
   std::int64_t substeps = 0;  // of the last frame
   double rest_after = 0;      // s
+  int halvings = 0;           // of the planned step
+  std::vector<Repair> repairs;
+  std::string failure;
 
-  explicit State(Scene given);
+  State(Scene given, SolverFactory factory);
   void bind_forces();
   void step(double time, double dt);
-  bool quiet();
+  bool compute_frame();
+  Attempt attempt();
+  bool quiet() const;
+  void set_halvings(int count);
   Plan plan_for(const std::vector<Matrix3Xd>& x) const;
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
 };
@@ -116,8 +146,11 @@ void Simulation::State::bind_forces() {
   }
 }
 
-Simulation::State::State(Scene given)
-    : scene(std::move(given)), sheets(scene.sheets.size()), rest_after(end_of_paths(scene)) {
+Simulation::State::State(Scene given, SolverFactory factory)
+    : scene(std::move(given)),
+      make_solver(std::move(factory)),
+      sheets(scene.sheets.size()),
+      rest_after(end_of_paths(scene)) {
   std::vector<Matrix3Xd> x(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const SheetDefinition& definition = scene.sheets[s];
@@ -138,6 +171,8 @@ Simulation::State::State(Scene given)
         v.col(i) = (offset_at(pin.path, dt) - offset_at(pin.path, 0)) / dt;
     sheets[s].solver = make_solver(scene, definition, sheets[s].dynamics);
     sheets[s].solver->start(x[s], v, 0, dt);
+    sheets[s].read(sheets[s].good);
+    sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
   }
 }
 
@@ -147,37 +182,107 @@ Plan Simulation::State::plan_for(const std::vector<Matrix3Xd>& x) const {
   shapes.reserve(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s)
     shapes.push_back({sheets[s].mesh, sheets[s].dynamics.inverse_mass, x[s]});
-  return make_plan(scene, shapes);
+  Plan made = make_plan(scene, shapes);
+  if (made.step.substeps <= kMaxSubsteps) {  // repairs stay
+    made.step.substeps <<= halvings;
+    made.step.substep = scene.solver.frame_step / static_cast<double>(made.step.substeps);
+  }
+  return made;
 }
 
-// Whether in the last frame kinetic energy and mean net forces, contact included, were small. Net
-// forces of one step would be as rough as positions are rounded.
-bool Simulation::State::quiet() {
+// Whether in the frame being computed kinetic energy and mean net forces, contact included, were
+// small. Net forces of one step would be as rough as positions are rounded.
+bool Simulation::State::quiet() const {
   constexpr double kEnergyShare = 1e-6, kForceShare = 0.01;
+  if (frame == 0 || time() + scene.solver.frame_step < rest_after) return false;
   const double given = scene.environment.gravity.norm();
   const double gravity = given > 0 ? given : kStandardGravity;
-  bool quiet = time() >= rest_after;
-  Matrix3Xd v;
+  const double most_change = kForceShare * gravity * scene.solver.frame_step;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
-    Sheet& sheet = sheets[s];
+    const Sheet& sheet = sheets[s];
     const Grid& grid = scene.sheets[s].grid;
     const double height = (std::max(grid.rows, grid.columns) - 1) * grid.spacing;
-    sheet.solver->velocities(v);
-    const double most_change = kForceShare * gravity * scene.solver.frame_step;
-    quiet = quiet && sheet.velocities.size() > 0;
+    const Matrix3Xd &v = sheet.next.v, &before = sheet.good.v;
     double energy = 0;
-    for (Eigen::Index i = 0; quiet && i < v.cols(); ++i) {
+    for (Eigen::Index i = 0; i < v.cols(); ++i) {
       if (sheet.dynamics.inverse_mass[i] == 0) continue;
       energy += sheet.mesh.mass[i] / 2 * v.col(i).squaredNorm();
-      quiet = (v.col(i) - sheet.velocities.col(i)).norm() <= most_change;
+      if ((v.col(i) - before.col(i)).norm() > most_change) return false;
     }
-    quiet = quiet && energy <= kEnergyShare * sheet.mesh.mass.sum() * gravity * height;
-    sheet.velocities.swap(v);
+    if (energy > kEnergyShare * sheet.mesh.mass.sum() * gravity * height) return false;
   }
-  return quiet;
+  return true;
 }
 
-Simulation::Simulation(Scene scene) : state_(std::make_unique<State>(std::move(scene))) {}
+// Computes the next frame from the state that the solvers are in, and has it looked at.
+Attempt Simulation::State::attempt() {
+  const double begin = time();
+  for (std::int64_t k = 0; k < plan.step.substeps; ++k)
+    step(begin + static_cast<double>(k) * plan.step.substep, plan.step.substep);
+
+  Attempt made{{}, {}, halvings};
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    Sheet& sheet = sheets[s];
+    sheet.read(sheet.next);
+    const Drive drive{scene.environment.gravity,
+                      drive_speed(scene, scene.sheets[s], begin, begin + scene.solver.frame_step),
+                      scene.solver.frame_step};
+    made.sheets.push_back(
+        scene.solver.max_repairs == 0
+            ? inspect_finite(sheet.next)
+            : inspect(sheet.mesh, drive, sheet.most_strain, sheet.good, sheet.next));
+    if (made.reason.empty() && !made.sheets.back().reason.empty())
+      made.reason = scene.sheets[s].name + ": " + made.sheets.back().reason;
+  }
+  return made;
+}
+
+// Attempts the next frame until it can be trusted; false: repairs are used up.
+bool Simulation::State::compute_frame() {
+  const std::size_t repairs_before = repairs.size();
+  const int halvings_before = halvings;
+  for (std::optional<Attempt> doubtful;;) {
+    Attempt made = attempt();
+    if (made.reason.empty()) return true;
+    if (doubtful && made.confirms(*doubtful)) {
+      // the longer step was right: it goes on from here
+      for (std::size_t s = 0; s < sheets.size(); ++s)
+        sheets[s].most_strain = std::max(sheets[s].most_strain, 2 * made.sheets[s].strain);
+      set_halvings(doubtful->halvings);
+      repairs.resize(repairs_before + static_cast<std::size_t>(halvings - halvings_before));
+      for (Sheet& sheet : sheets) {
+        Matrix3Xd v;
+        const double end = time() + scene.solver.frame_step;
+        sheet.solver->closing_velocities(end, v);
+        sheet.solver->start(sheet.next.x, v, end, plan.step.substep);
+      }
+      return true;
+    }
+
+    if (halvings >= scene.solver.max_repairs || 2 * plan.step.substeps > kMaxSubsteps) {
+      failure = "frame " + std::to_string(frame + 1) + " cannot be computed after " +
+                std::to_string(halvings) + " halvings of the step: " + made.reason;
+      return false;
+    }
+    // back to the last good frame
+    set_halvings(halvings + 1);
+    repairs.push_back({frame + 1, plan.step.substep, made.reason});
+    for (Sheet& sheet : sheets)
+      sheet.solver->start(sheet.good.x, sheet.good.v, time(), plan.step.substep);
+    doubtful = std::move(made);
+  }
+}
+
+void Simulation::State::set_halvings(int count) {
+  StepPlan& planned = plan.step;
+  planned.substeps = (planned.substeps >> halvings) << count;
+  planned.substep = scene.solver.frame_step / static_cast<double>(planned.substeps);
+  halvings = count;
+}
+
+Simulation::Simulation(Scene scene) : Simulation(std::move(scene), weft::make_solver) {}
+Simulation::Simulation(Scene scene, SolverFactory make_solver)
+    : state_(std::make_unique<State>(std::move(scene), std::move(make_solver))) {}
 Simulation::~Simulation() = default;
 Simulation::Simulation(Simulation&&) noexcept = default;
 Simulation& Simulation::operator=(Simulation&&) noexcept = default;
@@ -205,23 +310,22 @@ std::optional<StepRefusal> Simulation::refusal() const {
 bool Simulation::advance_frame() {
   assert(!refusal());
   State& state = *state_;
-  const StepPlan& step = state.plan.step;
-  const bool asleep = at_rest() && !state.scene.environment.wind;
-  state.substeps = asleep ? 0 : step.substeps;
-  if (asleep) {
+  if (at_rest() && !state.scene.environment.wind) {
+    state.substeps = 0;
     ++state.frame;
     return true;
   }
 
-  const double begin = state.time();
-  for (std::int64_t k = 0; k < step.substeps; ++k)
-    state.step(begin + static_cast<double>(k) * step.substep, step.substep);
-  for (const Sheet& sheet : state.sheets)
-    if (!sheet.solver->finite()) return false;
-  ++state.frame;
+  if (!state.failure.empty() || !state.compute_frame()) return false;
+  state.substeps = state.plan.step.substeps;
   state.frames_at_rest = state.quiet() ? state.frames_at_rest + 1 : 0;
+  for (Sheet& sheet : state.sheets) std::swap(sheet.good, sheet.next);
+  ++state.frame;
   return true;
 }
+
+const std::vector<Repair>& Simulation::repairs() const { return state_->repairs; }
+const std::string& Simulation::failure() const { return state_->failure; }
 
 std::int64_t Simulation::substeps() const { return state_->substeps; }
 
@@ -249,31 +353,25 @@ void copy_planes(const Matrix3Xd& from, Eigen::Index first, std::span<double> ou
 
 void Simulation::copy_positions(std::span<double> out) const {
   Eigen::Index first = 0;
-  Matrix3Xd x;
   for (const Sheet& sheet : state_->sheets) {
-    sheet.solver->positions(x);
-    copy_planes(x, first, out);
-    first += x.cols();
+    copy_planes(sheet.good.x, first, out);
+    first += sheet.good.x.cols();
   }
 }
 
 void Simulation::copy_velocities(std::span<double> out) const {
   Eigen::Index first = 0;
-  Matrix3Xd v;
   for (const Sheet& sheet : state_->sheets) {
-    sheet.solver->velocities(v);
-    copy_planes(v, first, out);
-    first += v.cols();
+    copy_planes(sheet.good.v, first, out);
+    first += sheet.good.v.cols();
   }
 }
 
 FrameStats Simulation::stats() const {
   FrameStats stats;
-  Matrix3Xd x, v;
   for (const Sheet& sheet : state_->sheets) {
-    sheet.solver->positions(x);
-    sheet.solver->velocities(v);
-    stats.kinetic_energy += sheet.mesh.mass.dot(v.colwise().squaredNorm().transpose()) / 2;
+    const Matrix3Xd& x = sheet.good.x;
+    stats.kinetic_energy += sheet.good.kinetic_energy;
     stats.potential_energy += spring_energy(sheet.mesh, x) + isometric_energy(sheet.mesh, x) -
                               sheet.mesh.mass.dot(x.transpose() * sheet.dynamics.gravity);
     stats.largest_strain = std::max(stats.largest_strain, largest_strain(sheet.mesh, x));
@@ -289,7 +387,7 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
   const double dt = state.plan.step.substep;
   std::vector<Matrix3Xd> x(state.sheets.size()), v(state.sheets.size());
   for (std::size_t s = 0; s < state.sheets.size(); ++s) {
-    state.sheets[s].solver->positions(x[s]);
+    x[s] = state.sheets[s].good.x;
     state.sheets[s].solver->closing_velocities(state.time(), v[s]);
   }
 
@@ -307,8 +405,10 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
   const double new_dt = state.plan.step.substep;
   for (std::size_t s = 0; s < state.sheets.size(); ++s) {
     Sheet& sheet = state.sheets[s];
-    if (s == index) sheet.solver = make_solver(state.scene, definition, sheet.dynamics);
-    if (s == index || new_dt != dt) sheet.solver->start(x[s], v[s], state.time(), new_dt);
+    if (s == index) sheet.solver = state.make_solver(state.scene, definition, sheet.dynamics);
+    if (s != index && new_dt == dt) continue;
+    sheet.solver->start(x[s], v[s], state.time(), new_dt);
+    sheet.read(sheet.good);
   }
   state.frames_at_rest = 0;
   return std::nullopt;

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/model/scene.h"
@@ -24,11 +26,29 @@ struct StepRefusal {
   bool too_many_substeps = false;  // else: asked lies above the linear bound
 };
 
+// A frame that had to be computed again with half the step, which then stays.
+struct Repair {
+  std::int64_t frame = 0;
+  double substep = 0;  // from then on, s
+  std::string reason;
+};
+
+class SheetSolver;
+struct Dynamics;
+// Makes what moves a sheet; `dynamics` outlives it.
+using SolverFactory = std::function<std::unique_ptr<SheetSolver>(
+    const Scene& scene, const SheetDefinition& sheet, const Dynamics& dynamics)>;
+
+// The fastest that can.
+std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefinition& sheet,
+                                         const Dynamics& dynamics);
+
 // A scene in motion. Not thread-safe; equal scenes and calls give equal bits.
 class Simulation {
  public:
   // Precondition: find_problems(scene) is empty.
   explicit Simulation(Scene scene);
+  Simulation(Scene scene, SolverFactory make_solver);
   ~Simulation();
   Simulation(Simulation&&) noexcept;
   Simulation& operator=(Simulation&&) noexcept;
@@ -38,10 +58,16 @@ class Simulation {
   // Set when the planned or asked step must not be run; advance_frame() is then not called.
   std::optional<StepRefusal> refusal() const;
 
-  // Advances by one frame step. Returns false, and leaves the frame unfinished for good, when a
-  // position stopped being finite. A scene at rest, without wind, sleeps: the frame repeats without
-  // a substep until a textile changes.
+  // Advances by one frame step. A frame that the guard does not trust (core/motion/guard.h) is
+  // computed again from the one before it with half the step; where both attempts agree, the motion
+  // is real and the step stays. After scene().solver.max_repairs repairs it returns false for good,
+  // with the state of the last good frame. A scene at rest, without wind, sleeps: the frame repeats
+  // without a substep until a textile changes.
   [[nodiscard]] bool advance_frame();
+  // All so far.
+  const std::vector<Repair>& repairs() const;
+  // Why advance_frame() returned false.
+  const std::string& failure() const;
   // Substeps that the last frame took.
   std::int64_t substeps() const;
 

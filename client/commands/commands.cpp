@@ -88,6 +88,10 @@ std::string session_text(const v1::Session& session) {
       .add("sheets", sheets_text(session.scene()))
       .add("colliders", std::to_string(session.scene().colliders_size()))
       .add("created", google::protobuf::util::TimeUtil::ToString(session.create_time()));
+  for (const auto& repair : session.repairs()) {
+    facts.add("repair", fmt::format("frame {}, {} a substep from there on: {}", repair.frame(),
+                                    seconds_text(repair.substep_s()), repair.reason()));
+  }
   if (!session.failure().empty()) facts.add("failure", session.failure());
   return facts.text();
 }

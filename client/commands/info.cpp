@@ -42,6 +42,7 @@ std::string facts_text(const RecordingReader& recording, const Inspection& inspe
         .add("simulated time",
              fmt::format("{:.6g} s to {:.6g} s", tally.first_time_s, tally.last_time_s))
         .add("largest strain", percent_text(tally.largest_strain))
+        .add("repairs", tally.repairs == 0 ? "none" : std::to_string(tally.repairs))
         .add("kinetic energy", number_text(tally.last_stats.kinetic_energy_j()) + " J at the end")
         .add("potential energy",
              number_text(tally.last_stats.potential_energy_j()) + " J at the end")

@@ -36,6 +36,7 @@ void answer(Context& context, const RecordingOrder& order, const RecordingResult
                   {"last_time_s", tally.last_time_s},
                   {"substeps", tally.substeps},
                   {"largest_strain", tally.largest_strain},
+                  {"repairs", tally.repairs},
                   {"at_rest", tally.last_stats.at_rest()},
                   {"reconnections", result.reconnections}};
   std::string text = fmt::format("{}: {}", order.path, count_of(tally.frames, "frame"));
@@ -45,6 +46,7 @@ void answer(Context& context, const RecordingOrder& order, const RecordingResult
                         tally.last_stats.at_rest() ? " (at rest)" : "",
                         percent_text(tally.largest_strain));
   }
+  if (tally.repairs > 0) text += fmt::format(", {}", count_of(tally.repairs, "repair"));
   if (result.reconnections > 0)
     text += fmt::format(", connected again {}", count_of(result.reconnections, "time"));
   context.answer(json, text + '\n');

@@ -64,6 +64,7 @@ RecordingResult record(Connection& connection, const RecordingOrder& order,
         result.complete =
             !order.to && !order.until_rest && has_ended(message->progress(), result.tally);
         break;
+      case v1::StreamFramesResponse::kRepair:  // counted with its frame
       case v1::StreamFramesResponse::MESSAGE_NOT_SET:
         break;
     }

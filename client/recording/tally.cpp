@@ -13,6 +13,7 @@ void Tally::add(const v1::Frame& frame) {
   last_frame = frame.number();
   last_time_s = frame.time_s();
   substeps += frame.stats().substep_count();
+  repairs += frame.stats().repair_count();
   largest_strain = std::max(largest_strain, frame.stats().largest_strain());
   bytes +=
       static_cast<std::int64_t>(frame.positions_m().size() + frame.velocities_m_per_s().size());

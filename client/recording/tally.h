@@ -15,6 +15,7 @@ struct Tally {
   double last_time_s = 0;
   std::int64_t substeps = 0;
   double largest_strain = 0;
+  std::int64_t repairs = 0;
   std::int64_t bytes = 0;  // of the arrays
   v1::FrameStats last_stats;
 

@@ -73,8 +73,10 @@ double largest_strain(const Mesh& mesh, const Matrix3Xd& x) {
   double strain = 0;
   for (const Family& family : mesh.families) {
     if (family.kind != FamilyKind::kStretch) continue;
+    double squared = 0;
     for (const auto& [i, j] : family.connections)
-      strain = std::max(strain, (x.col(j) - x.col(i)).norm() / family.rest_length - 1);
+      squared = std::max(squared, (x.col(j) - x.col(i)).squaredNorm());
+    strain = std::max(strain, std::sqrt(squared) / family.rest_length - 1);
   }
   return strain;
 }

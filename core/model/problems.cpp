@@ -207,6 +207,7 @@ void check_solver(const SolverSettings& solver, Check& check) {
   check.number("solver.frame_step_s", solver.frame_step, 1e-6, 10, "s");
   if (solver.substep) check.number("solver.substep_s", *solver.substep, 1e-9, 10, "s");
   check.number("solver.safety", solver.safety, 0.01, 1, "");
+  check.number("solver.max_repairs", solver.max_repairs, 0, 20, "");
 }
 
 }  // namespace

@@ -120,6 +120,8 @@ struct SolverSettings {
   std::optional<double> substep;  // asked for, s
   bool allow_unstable = false;
   double safety = 0.9;  // planned substep / linear bound
+  // Most halvings of the step by the guard; 0: only what is not finite stops a run.
+  int max_repairs = 12;
 };
 
 struct Scene {

@@ -38,6 +38,7 @@ v1::Textile as_given(const Textile& textile);
 v1::Scene as_given(const Scene& scene);
 
 v1::Plan to_proto(const Plan& plan);
+v1::Repair to_proto(const Repair& repair);
 v1::SessionState to_proto(SessionState state);
 
 }  // namespace weft

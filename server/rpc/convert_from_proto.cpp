@@ -263,6 +263,7 @@ SolverSettings Reader::solver(const v1::SolverSettings& from) {
   if (from.has_substep_s()) solver.substep = from.substep_s();
   solver.allow_unstable = from.allow_unstable();
   if (from.has_safety()) solver.safety = from.safety();
+  if (from.has_max_repairs()) solver.max_repairs = from.max_repairs();
   return solver;
 }
 

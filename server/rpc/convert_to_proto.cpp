@@ -151,6 +151,7 @@ void set(v1::SolverSettings* to, const SolverSettings& from) {
   if (from.substep) to->set_substep_s(*from.substep);
   to->set_allow_unstable(from.allow_unstable);
   to->set_safety(from.safety);
+  to->set_max_repairs(from.max_repairs);
   to->set_precision(from.precision == Precision::kSingle ? v1::PRECISION_SINGLE
                                                          : v1::PRECISION_DOUBLE);
 }
@@ -186,6 +187,7 @@ v1::Session to_proto(const Session& session, StartValues start_values) {
   *result.mutable_plan() = to_proto(*status.plan);
   result.set_failure(status.failure);
   result.set_numerics_id(session.numerics_id());
+  for (const auto& repair : status.repairs) *result.add_repairs() = to_proto(repair);
   const auto since_epoch = session.create_time().time_since_epoch();
   *result.mutable_create_time() = google::protobuf::util::TimeUtil::NanosecondsToTimestamp(
       std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count());
@@ -245,6 +247,14 @@ v1::Plan to_proto(const Plan& plan) {
     added->set_least_curvature_per_m(limit.least_curvature);
     added->set_finest_spacing_m(limit.finest_spacing);
   }
+  return result;
+}
+
+v1::Repair to_proto(const Repair& repair) {
+  v1::Repair result;
+  result.set_frame(repair.frame);
+  result.set_substep_s(repair.substep);
+  result.set_reason(repair.reason);
   return result;
 }
 

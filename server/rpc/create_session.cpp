@@ -1,3 +1,5 @@
+#include <spdlog/spdlog.h>
+
 #include <new>
 #include <utility>
 
@@ -166,7 +168,8 @@ grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
   const auto session =
       std::make_shared<Session>(identity, std::move(simulation),
                                 static_cast<std::size_t>(backend_.limits.history_bytes_per_session),
-                                backend_.scheduler, backend_.store->log_of(identity.uid, 0));
+                                backend_.scheduler, backend_.store->log_of(identity.uid, 0),
+                                [](const std::string& line) { spdlog::warn(line); });
   response = to_proto(*session);
   if (request.validate_only()) {
     response.clear_name();

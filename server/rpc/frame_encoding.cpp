@@ -41,6 +41,7 @@ v1::StreamFramesResponse message_of(const Frame& frame, const v1::FrameFormat& f
     stats->set_substep_count(frame.substeps);
     stats->set_substep_s(frame.substep);
     stats->set_at_rest(frame.at_rest);
+    stats->set_repair_count(static_cast<std::int64_t>(frame.repairs.size()));
   }
   return message;
 }

@@ -118,6 +118,7 @@ void FrameStream::OnDone() {
 void FrameStream::read_on(bool progress_due) {
   if (writing_ || finished_) return;
   if (ending_) return finish(*ending_);
+  if (!repairs_.empty()) return write_repair();
   if (last_frame_ && request_.has_end_frame() && *last_frame_ >= request_.end_frame()) {
     return finish(grpc::Status::OK);
   }
@@ -125,6 +126,7 @@ void FrameStream::read_on(bool progress_due) {
   switch (reading.kind) {
     case Reading::Kind::kFrame:
       last_frame_ = reading.frame->number;
+      repairs_.assign(reading.frame->repairs.begin(), reading.frame->repairs.end());
       return write(encoded_frame(*reading.frame, request_.format()));
     case Reading::Kind::kNothingYet:
       if (progress_due || reading.progress.state_changes != state_changes_) {
@@ -177,6 +179,13 @@ void FrameStream::write_progress(const Progress& progress) {
   to->set_oldest_frame(progress.oldest_frame);
   to->set_state(to_proto(progress.state));
   to->set_at_rest(progress.at_rest);
+  write(encoded(message));
+}
+
+void FrameStream::write_repair() {
+  v1::StreamFramesResponse message;
+  *message.mutable_repair() = to_proto(repairs_.front());
+  repairs_.pop_front();
   write(encoded(message));
 }
 

@@ -4,6 +4,7 @@
 #include <grpcpp/support/server_callback.h>
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -43,6 +44,7 @@ class FrameStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   void write(grpc::ByteBuffer message);
   void write_header();
   void write_progress(const Progress& progress);
+  void write_repair();
   void finish(const grpc::Status& status);
 
   Backend& backend_;
@@ -59,6 +61,7 @@ class FrameStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   bool finished_ = false;
   std::optional<grpc::Status> ending_;  // as soon as nothing is in flight
   std::optional<std::int64_t> last_frame_;
+  std::deque<Repair> repairs_;  // of the last frame, still to be written
   std::uint64_t state_changes_ = 0;
   Clock::time_point last_write_;
 };

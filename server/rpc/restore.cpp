@@ -31,7 +31,8 @@ void restore(Backend& backend, LeftSession left) {
   const auto session = std::make_shared<Session>(
       identity, std::move(simulation),
       static_cast<std::size_t>(backend.limits.history_bytes_per_session), backend.scheduler,
-      backend.store->log_of(identity.uid, left.past.log.size()));
+      backend.store->log_of(identity.uid, left.past.log.size()),
+      [](const std::string& line) { spdlog::warn(line); });
   backend.registry.restore(session);
   session->restore(std::move(left.past));
 }

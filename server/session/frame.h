@@ -46,8 +46,9 @@ struct Frame {
   std::vector<double> velocities;  // (3 x particles) planes x, y, z, m/s
   FrameStats stats;
   bool at_rest = false;
-  std::int64_t substeps = 0;  // since the frame before
-  double substep = 0;         // s
+  std::int64_t substeps = 0;    // since the frame before
+  double substep = 0;           // s
+  std::vector<Repair> repairs;  // that it took
   EncodingCache encodings;
 
   std::size_t bytes() const {  // without encodings

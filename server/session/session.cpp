@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cassert>
+#include <iomanip>
 #include <iterator>
 #include <limits>
 #include <new>
 #include <random>
+#include <sstream>
 
 namespace weft {
 namespace {
@@ -31,16 +33,17 @@ SessionIdentity make_identity(std::string id, std::string numerics_id) {
 }
 
 Session::Session(SessionIdentity identity, Simulation simulation, std::size_t history_bytes,
-                 Scheduler& scheduler, std::unique_ptr<SessionLog> log)
+                 Scheduler& scheduler, std::unique_ptr<SessionLog> log, Notify notify)
     : identity_(std::move(identity)),
       scheduler_(scheduler),
       log_(std::move(log)),
+      notify_(std::move(notify)),
       simulation_(std::move(simulation)),
       scene_(simulation_.scene()),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),
       history_(history_bytes) {
-  history_.push(make_frame(), 0);
+  history_.push(make_frame({}), 0);
 }
 
 void Session::restore(SessionPast past) {
@@ -62,7 +65,7 @@ void Session::restore(SessionPast past) {
 
 SessionStatus Session::status() const {
   std::lock_guard lock(mutex_);
-  return {state_, history_.latest(), textiles_, plan_, failure_};
+  return {state_, history_.latest(), textiles_, plan_, repairs_, failure_};
 }
 
 void Session::submit(Command command) {
@@ -203,6 +206,7 @@ void Session::fail(const std::string& why) {
     restoring_.reset();
     set_state(SessionState::kFailed);
   }
+  if (notify_) notify_("session " + identity_.id + " failed: " + failure_);
   offer_to_all();
 }
 
@@ -521,11 +525,10 @@ void Session::end_step() {
 }
 
 void Session::compute_frame() {
-  if (!simulation_.advance_frame()) {
-    return fail("the solver diverged in frame " + std::to_string(simulation_.frame() + 1) +
-                ": a position stopped being finite");
-  }
-  const auto frame = make_frame();
+  const bool good = simulation_.advance_frame();
+  auto repairs = take_repairs();
+  if (!good) return fail("the solver diverged: " + simulation_.failure());
+  const auto frame = make_frame(std::move(repairs));
   {
     std::lock_guard lock(mutex_);
     if (closed_) return;
@@ -536,6 +539,27 @@ void Session::compute_frame() {
     }
   }
   offer_to_all();
+}
+
+// Those that the last frame took, which are published with it.
+std::vector<Repair> Session::take_repairs() {
+  const std::vector<Repair>& all = simulation_.repairs();
+  std::vector<Repair> taken;
+  {
+    std::lock_guard lock(mutex_);
+    taken.assign(all.begin() + static_cast<std::ptrdiff_t>(repairs_.size()), all.end());
+    if (taken.empty()) return taken;
+    repairs_ = all;
+    plan_ = std::make_shared<const Plan>(simulation_.plan());
+  }
+  if (!notify_) return taken;
+  for (const Repair& repair : taken) {
+    std::ostringstream us;
+    us << std::setprecision(4) << repair.substep * 1e6;
+    notify_("session " + identity_.id + ": frame " + std::to_string(repair.frame) +
+            " is computed again, " + us.str() + " us a substep: " + repair.reason);
+  }
+  return taken;
 }
 
 // When the next frame is to be computed; nullopt: not before something happens.
@@ -555,7 +579,7 @@ std::optional<Clock::time_point> Session::next_due() {
   return run_->start_time + std::chrono::duration_cast<Clock::duration>(since_start);
 }
 
-std::shared_ptr<const Frame> Session::make_frame() const {
+std::shared_ptr<const Frame> Session::make_frame(std::vector<Repair> repairs) const {
   auto frame = std::make_shared<Frame>();
   const std::size_t values = 3 * static_cast<std::size_t>(simulation_.particle_count());
   frame->number = simulation_.frame();
@@ -568,6 +592,7 @@ std::shared_ptr<const Frame> Session::make_frame() const {
   frame->at_rest = simulation_.at_rest();
   frame->substeps = simulation_.substeps();
   frame->substep = simulation_.plan().step.substep;
+  frame->repairs = std::move(repairs);
   return frame;
 }
 

@@ -37,6 +37,7 @@ struct SessionStatus {
   std::shared_ptr<const Frame> newest;
   std::vector<Textile> textiles;  // of each sheet, now
   std::shared_ptr<const Plan> plan;
+  std::vector<Repair> repairs;  // all so far
   std::string failure;
 };
 
@@ -45,6 +46,9 @@ struct SessionPast {
   std::vector<LogEntry> log;
   Reach reach;
 };
+// Hears what an operator should know: repairs and failures, a line each. Called from any thread,
+// with no lock held. Must not block.
+using Notify = std::function<void(const std::string& line)>;
 
 // A simulation that advances on a scheduler. Calls reach it as commands that are carried out
 // between two frames, each when it is safe in the log; frames leave as shared, constant values. All
@@ -61,7 +65,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   // PAUSED at frame 0. Precondition: the simulation has no refusal. The scheduler outlives the
   // session; at least two frames are kept, more as long as they fit into `history_bytes`.
   Session(SessionIdentity identity, Simulation simulation, std::size_t history_bytes,
-          Scheduler& scheduler, std::unique_ptr<SessionLog> log);
+          Scheduler& scheduler, std::unique_ptr<SessionLog> log, Notify notify = {});
 
   // Computes again what there was before any command is carried out, then goes on as it was. Called
   // at most once, first.
@@ -146,9 +150,10 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Outcome pause();
   Outcome apply(const TextileSet& change);
   void compute_frame();
+  std::vector<Repair> take_repairs();
   void fail(const std::string& why);
   std::optional<Clock::time_point> next_due();
-  std::shared_ptr<const Frame> make_frame() const;
+  std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs) const;
 
   // with the mutex held
   std::int64_t latest() const { return history_.latest()->number; }
@@ -176,6 +181,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   const SessionIdentity identity_;
   Scheduler& scheduler_;
   const std::unique_ptr<SessionLog> log_;
+  const Notify notify_;
   Simulation simulation_;                  // touched by the slice only
   Answers<Outcome> answers_{kMaxAnswers};  // touched by the slice only
   const Scene scene_;
@@ -190,6 +196,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::string failure_;
   std::vector<Textile> textiles_;
   std::shared_ptr<const Plan> plan_;
+  std::vector<Repair> repairs_;
   History history_;
   std::vector<Subscription*> subscriptions_;
   bool held_ = false;  // idle until a subscriber reads on

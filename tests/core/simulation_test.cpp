@@ -308,6 +308,7 @@ TEST(Simulation, ADivergedRunIsReportedNotPublished) {
   Scene scene = hanging();
   scene.solver.substep = 0.01;
   scene.solver.allow_unstable = true;
+  scene.solver.max_repairs = 0;
   Simulation simulation(scene);
   int frames = 0;
   while (simulation.advance_frame() && frames < 10000) ++frames;

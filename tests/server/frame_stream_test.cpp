@@ -203,6 +203,38 @@ TEST(StreamFrames, EndsAfterTheLastGoodFrameOfASolverThatDiverged) {
       << "the good frames stay readable";
 }
 
+TEST(StreamFrames, TellsOfARepairRightAfterTheFrameThatTookIt) {
+  Service service;
+  v1::Scene scene = diverging_scene();
+  scene.mutable_solver()->clear_max_repairs();
+  const v1::Session session = service.create(scene);
+  auto request = frames_of(session, 0, 40);
+  request.mutable_format()->set_stats(true);
+  Stream stream(service, request);
+  service.run(session, 40);
+  std::vector<v1::Repair> told;
+  std::int64_t frame = -1, owed = 0;
+  while (const auto message = stream.read()) {
+    if (message->has_frame()) {
+      EXPECT_EQ(owed, 0) << "before frame " << message->frame().number();
+      frame = message->frame().number();
+      owed = message->frame().stats().repair_count();
+    } else if (message->has_repair()) {
+      EXPECT_EQ(message->repair().frame(), frame);
+      EXPECT_NE(message->repair().reason(), "");
+      --owed;
+      told.push_back(message->repair());
+    }
+  }
+  EXPECT_EQ(frame, 40);
+  EXPECT_EQ(owed, 0);
+  const v1::Session now = service.get(session);
+  EXPECT_EQ(now.state(), v1::SESSION_STATE_PAUSED);
+  ASSERT_EQ(static_cast<std::size_t>(now.repairs_size()), told.size());
+  ASSERT_FALSE(told.empty()) << "0.05 s is 8 times what is stable";
+  EXPECT_EQ(now.plan().substep_s(), told.back().substep_s());
+}
+
 TEST(StreamFrames, ReportsProgressWhenTheStateChangesAndWhileNothingHappens) {
   Service service;
   const v1::Session session = service.create();

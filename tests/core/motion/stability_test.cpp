@@ -42,6 +42,7 @@ bool survives(SheetDefinition sheet, double limit, double dt) {
   scene.solver.frame_step = 1000 * dt;
   scene.solver.substep = dt;
   scene.solver.allow_unstable = true;
+  scene.solver.max_repairs = 0;
   Simulation simulation(scene);
   for (int frame = 0; frame < 20; ++frame)
     if (!simulation.advance_frame() ||

@@ -33,6 +33,7 @@ Scene diverging_scene() {
   scene.solver.frame_step = 1;
   scene.solver.substep = 0.05;
   scene.solver.allow_unstable = true;
+  scene.solver.max_repairs = 0;
   return scene;
 }
 

@@ -2,9 +2,13 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <limits>
+#include <mutex>
 #include <thread>
 
 #include "tests/server/session/session_support.h"
+#include "tests/support/core/faulty_solver.h"
 
 namespace weft::testing {
 namespace {
@@ -199,6 +203,67 @@ TEST(Session, ASolverThatDivergesFailsTheSessionAndItsGoodFramesStay) {
   EXPECT_EQ(run(*session).refused(), Refusal::Why::kFailed);
   EXPECT_EQ(step(*session, 1).refused(), Refusal::Why::kFailed);
   EXPECT_EQ(set_bend(*session, 1e-4).refused(), Refusal::Why::kFailed);
+}
+
+// Frames 1 to `last` as a subscriber reads them; none holds a value that is not finite.
+std::vector<std::shared_ptr<const Frame>> finite_frames(Watcher& watcher, std::int64_t last) {
+  std::vector<std::shared_ptr<const Frame>> frames;
+  do {
+    frames.push_back(watcher.read().frame);
+    const Frame& frame = *frames.back();
+    for (const double value : frame.positions) EXPECT_TRUE(std::isfinite(value));
+    for (const double value : frame.velocities) EXPECT_TRUE(std::isfinite(value));
+    EXPECT_TRUE(std::isfinite(frame.stats.kinetic_energy + frame.stats.potential_energy +
+                              frame.stats.largest_strain));
+  } while (frames.back()->number < last);
+  return frames;
+}
+
+TEST(Session, RepairsAFaultInTheMiddleOfARunAndTellsOfIt) {
+  Scheduler scheduler(2);
+  std::mutex mutex;
+  std::vector<std::string> lines;
+  const auto session = std::make_shared<Session>(
+      "test",
+      Simulation(hung_scene(),
+                 faulty_solvers(
+                     {.frame = 7, .times = 2, .jump = std::numeric_limits<double>::quiet_NaN()})),
+      kMuchHistory, scheduler, [&](const std::string& line) {
+        std::lock_guard lock(mutex);
+        lines.push_back(line);
+      });
+  const std::int64_t planned = session->status().plan->step.substeps;
+  const auto watcher = Watcher::of(*session, 1);
+  step(*session, 20).applied();
+  for (const auto& frame : finite_frames(*watcher, 20)) {
+    EXPECT_EQ(frame->repairs.size(), frame->number == 7 ? 2u : 0u);
+    EXPECT_EQ(frame->substeps, frame->number < 7 ? planned : 4 * planned);
+  }
+  const SessionStatus status = session->status();
+  EXPECT_EQ(status.state, SessionState::kPaused);
+  ASSERT_EQ(status.repairs.size(), 2u);
+  EXPECT_EQ(status.repairs[1].frame, 7);
+  EXPECT_EQ(status.plan->step.substeps, 4 * planned);
+  std::lock_guard lock(mutex);
+  EXPECT_THAT(lines, ::testing::ElementsAre(::testing::HasSubstr("frame 7"),
+                                            ::testing::HasSubstr("stopped being finite")));
+}
+
+TEST(Session, FailsWhenRepairsAreUsedUpWithItsLastGoodFrameReadable) {
+  Scheduler scheduler(2);
+  const auto session = std::make_shared<Session>(
+      "test", Simulation(hung_scene(), faulty_solvers({.frame = 7, .times = 1000, .jump = 1e300})),
+      kMuchHistory, scheduler);
+  const auto watcher = Watcher::of(*session, 1);
+  EXPECT_EQ(step(*session, 20).refused(), Refusal::Why::kFailed);
+  const SessionStatus status = session->status();
+  EXPECT_EQ(status.state, SessionState::kFailed);
+  EXPECT_EQ(status.newest->number, 6);
+  EXPECT_EQ(status.repairs.size(), 12u);
+  EXPECT_THAT(status.failure, ::testing::HasSubstr("frame 7"));
+  EXPECT_THAT(status.failure, ::testing::HasSubstr("after 12 halvings"));
+  finite_frames(*watcher, 6);
+  EXPECT_EQ(watcher->read().kind, Reading::Kind::kFailed);
 }
 
 TEST(Session, ClosingAnswersEveryCommandThatWaits) {

@@ -45,6 +45,7 @@ v1::Scene diverging_scene() {
   scene.mutable_solver()->set_frame_step_s(1);
   scene.mutable_solver()->set_substep_s(0.05);
   scene.mutable_solver()->set_allow_unstable(true);
+  scene.mutable_solver()->set_max_repairs(0);
   return scene;
 }
 

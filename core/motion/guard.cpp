@@ -1,0 +1,104 @@
+#include "core/motion/guard.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "core/forces/springs.h"
+
+namespace weft {
+namespace {
+
+template <class... Parts>
+std::string join(const Parts&... parts) {
+  std::ostringstream out;
+  out.precision(4);
+  (out << ... << parts);
+  return out.str();
+}
+
+// False for NaN too.
+bool within_reach(const Matrix3Xd& values) {
+  if (values.squaredNorm() <= kFarthest * kFarthest) return true;
+  bool within = true;
+  for (const double value : values.reshaped()) within &= std::abs(value) <= kFarthest;
+  return within;
+}
+
+double elastic_energy(const Mesh& mesh, const Matrix3Xd& x) {
+  return spring_energy(mesh, x) + isometric_energy(mesh, x);
+}
+
+double path_speed(const Path& path, double begin, double end) {
+  double speed = 0;
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    if (path[k].time <= begin || path[k - 1].time >= end) continue;
+    speed = std::max(
+        speed, (path[k].offset - path[k - 1].offset).norm() / (path[k].time - path[k - 1].time));
+  }
+  return speed;
+}
+
+bool close(double one, double other) {
+  return std::abs(one - other) <= 0.25 * std::max(std::abs(one), std::abs(other));
+}
+
+}  // namespace
+
+double kinetic_energy(const Mesh& mesh, const Matrix3Xd& v) {
+  double twice = 0;
+  for (Eigen::Index i = 0; i < v.cols(); ++i) twice += mesh.mass[i] * v.col(i).squaredNorm();
+  return twice / 2;
+}
+
+double drive_speed(const Scene& scene, const SheetDefinition& sheet, double begin, double end) {
+  double speed = 0;
+  for (const Pin& pin : sheet.pins) speed = std::max(speed, path_speed(pin.path, begin, end));
+  for (const Collider& collider : scene.colliders)
+    speed = std::max(speed, path_speed(collider.path, begin, end));
+  if (const auto& wind = scene.environment.wind)
+    speed = std::max(speed, wind->velocity.norm() * (1 + wind->gust));
+  return speed;
+}
+
+Verdict inspect_finite(const SheetState& after) {
+  Verdict verdict;
+  verdict.finite = within_reach(after.x) && within_reach(after.v);
+  if (!verdict.finite) verdict.reason = "a position or velocity stopped being finite";
+  return verdict;
+}
+
+Verdict inspect(const Mesh& mesh, const Drive& drive, double most_strain, const SheetState& before,
+                const SheetState& after) {
+  Verdict verdict = inspect_finite(after);
+  if (!verdict.finite) return verdict;
+
+  verdict.strain = largest_strain(mesh, after.x);
+  if (verdict.strain > most_strain)
+    verdict.reason = join("a strain of ", 100 * verdict.strain, " % passed the limit of ",
+                          100 * most_strain, " %");
+
+  // energy cannot have grown much unless motion did
+  const double mass = mesh.mass.sum();
+  const double fall = drive.gravity.norm() * drive.frame_step;
+  const double driven = 10 * mass * (drive.speed * drive.speed + fall * fall);  // J
+  const double kinetic = after.kinetic_energy, kinetic_before = before.kinetic_energy;
+  if (kinetic <= 2 * kinetic_before + driven && verdict.reason.empty()) return verdict;
+  const double elastic_before = elastic_energy(mesh, before.x);
+  const double weight_work = mesh.mass.dot((after.x - before.x).transpose() * drive.gravity);
+  const double grown =
+      kinetic - kinetic_before + elastic_energy(mesh, after.x) - elastic_before - weight_work;
+  const double limit = kinetic_before + elastic_before + driven;
+  verdict.energy = kinetic_before + elastic_before + grown;
+  if (grown > limit && verdict.reason.empty())
+    verdict.reason =
+        join("energy grew by ", grown, " J in a frame, past the limit of ", limit, " J");
+  return verdict;
+}
+
+bool confirms(const Verdict& one, const Verdict& other) {
+  return one.finite && other.finite && close(one.strain, other.strain) &&
+         close(one.energy, other.energy);
+}
+
+}  // namespace weft

@@ -1,0 +1,196 @@
+// Scenes that find_problems() allows and that nobody should run: each ends in a correct result, a
+// refusal, or a repaired run; none in a hang, a crash or a frame that is not finite.
+#include <gmock/gmock.h>
+
+#include "core/motion/guard.h"
+#include "tests/support/core/scenes.h"
+
+namespace weft::testing {
+namespace {
+
+using ::testing::IsEmpty;
+
+const Vector3d kGravity{0, -9.8, 0};
+
+// Both precisions, and the plain solver.
+std::vector<Scene> on_every_solver(Scene scene) {
+  std::vector<Scene> scenes(3, scene);
+  scenes[0].solver.precision = Precision::kSingle;
+  scenes[1].solver.precision = Precision::kDouble;
+  scenes[2].solver.plain = true;
+  return scenes;
+}
+
+Scene scene_of(const SheetDefinition& sheet) {
+  Scene scene = floating(sheet);
+  scene.environment.gravity = kGravity;
+  return scene;
+}
+
+SheetDefinition held(SheetDefinition sheet) {
+  sheet.pins = {{{0, sheet.grid.columns - 1}, {}}};
+  return sheet;
+}
+
+double farthest(const Simulation& simulation) {
+  return positions(simulation).cwiseAbs().maxCoeff();
+}
+
+// Runs so many frames, each finite and within `reach` m of the origin.
+Simulation run(const Scene& scene, int frames, double reach) {
+  EXPECT_THAT(find_problems(scene), IsEmpty());
+  Simulation simulation(scene);
+  EXPECT_FALSE(simulation.refusal());
+  for (int frame = 0; frame < frames; ++frame) {
+    if (!simulation.advance_frame()) {
+      ADD_FAILURE() << simulation.failure();
+      break;
+    }
+    EXPECT_TRUE(velocities(simulation).allFinite());
+    EXPECT_LT(farthest(simulation), reach) << "in frame " << simulation.frame();
+    if (!(farthest(simulation) < reach)) break;
+  }
+  return simulation;
+}
+
+// All particles of a row in one place: no connection along it has a direction.
+TEST(HostileScene, EdgesOfNoLengthUnfoldUnderTheWeight) {
+  SheetDefinition sheet = held(flat_sheet(6, 6));
+  Matrix3Xd x = start_positions(sheet);
+  x.row(0).setZero();
+  sheet.start_positions = values(x);
+  for (const Scene& scene : on_every_solver(scene_of(sheet))) run(scene, 100, 0.5);
+}
+
+TEST(HostileScene, ASheetInOnePointStaysOneAndFalls) {
+  SheetDefinition sheet = flat_sheet(5, 5);
+  sheet.start_positions.assign(75, 0.0);
+  for (const Scene& scene : on_every_solver(scene_of(sheet))) {
+    const Simulation simulation = run(scene, 10, 1);
+    const Matrix3Xd x = positions(simulation);
+    const double t = simulation.time();
+    EXPECT_LT((x.colwise() - Vector3d(0, -4.9 * t * t, 0)).cwiseAbs().maxCoeff(), 1e-6);
+  }
+}
+
+TEST(HostileScene, AParticlePinnedInsideAColliderHoldsWhileTheOthersLieOnIt) {
+  SheetDefinition sheet = flat_sheet(9, 9, 0.05);
+  sheet.origin = {-0.2, 0, -0.2};
+  sheet.textile.damping = 2e-2;
+  sheet.pins = {{{40}, {}}};
+  Scene scene = scene_of(sheet);
+  scene.colliders = {{"ball", Sphere{{0, 0, 0}, 0.12}, 0.3, {}}};
+  for (const Scene& each : on_every_solver(scene)) {
+    const Simulation simulation = run(each, 100, 1);
+    const Matrix3Xd x = positions(simulation);
+    EXPECT_LT(x.col(40).norm(), 1e-12);
+    for (int i = 0; i < 81; ++i) EXPECT_GT(i == 40 ? 1 : x.col(i).norm(), 0.12) << i;
+    EXPECT_THAT(simulation.repairs(), IsEmpty());
+  }
+}
+
+TEST(HostileScene, AColliderThatStartsInTheClothPushesItOutWithoutThrowingIt) {
+  SheetDefinition sheet = flat_sheet(9, 9, 0.05);
+  sheet.origin = {-0.2, 0.02, -0.2};
+  sheet.textile.damping = 2e-2;
+  Scene scene = scene_of(sheet);
+  scene.colliders = {{"box", Box{{0, 0, 0}, {0.1, 0.1, 0.1}, Quaterniond::Identity()}, 1, {}},
+                     {"floor", Plane{{0, -1, 0}, {0, 1, 0}}, 1, {}}};
+  for (const Scene& each : on_every_solver(scene)) {
+    const Simulation simulation = run(each, 100, 1.5);
+    const Matrix3Xd x = positions(simulation);
+    for (int i = 0; i < 81; ++i)
+      EXPECT_GT(x.col(i).cwiseAbs().maxCoeff(), 0.1 - 1e-6) << i << " is inside the box";
+  }
+}
+
+// 50 m/s for 20 ms, on the corner of a sheet that is free else.
+TEST(HostileScene, APinThatMovesAt50MetresASecondTakesTheClothAlong) {
+  SheetDefinition sheet = flat_sheet(9, 9, 0.02);
+  sheet.pins = {{{0}, {{0, {0, 0, 0}}, {0.02, {1, 0, 0}}}}};
+  sheet.textile.damping = 5e-2;
+  for (const Scene& each : on_every_solver(scene_of(sheet))) {
+    const Simulation simulation = run(each, 100, 5);
+    EXPECT_LT((positions(simulation).col(0) - Vector3d(1, 0, 0)).norm(), 1e-6);
+    EXPECT_LT(simulation.stats().largest_strain, 1);
+  }
+}
+
+TEST(HostileScene, WithoutBendingOrItsClampASheetHangsFromItsPins) {
+  for (const auto& [bend, clamp] : {std::pair(0.0, 2000.0), {1e-4, 0.0}, {0.0, 0.0}}) {
+    SheetDefinition sheet = held(flat_sheet(9, 9));
+    auto& raw = std::get<RawTextile>(sheet.textile.model);
+    raw.bend = bend;
+    raw.clamp = clamp;
+    for (const Scene& each : on_every_solver(scene_of(sheet))) {
+      const Simulation simulation = run(each, 100, 1);
+      EXPECT_LT(simulation.stats().largest_strain, 0.2);
+    }
+  }
+}
+
+// One g, and one microgram, a particle: sheets do not touch each other's accuracy.
+TEST(HostileScene, MassesAMillionfoldApartMoveAsTheyDoAlone) {
+  SheetDefinition heavy = held(flat_sheet(5, 5)), light = heavy;
+  light.name = "light";
+  std::get<RawTextile>(light.textile.model).particle_mass = 1e-9;
+  std::get<RawTextile>(light.textile.model).stretch = 0.2;
+  std::get<RawTextile>(light.textile.model).shear = 0.2;
+  std::get<RawTextile>(light.textile.model).bend = 1e-9;
+  light.textile.damping = 2e-9;
+  Scene alone = scene_of(light), both = alone;
+  both.sheets.push_back(heavy);
+  both.sheets[1].name = "heavy";
+  alone.solver.substep = both.solver.substep = 1e-5;
+  const Simulation a = run(alone, 20, 1), b = run(both, 20, 1);
+  EXPECT_EQ(positions(b).leftCols(25), positions(a));
+  EXPECT_THAT(b.repairs(), IsEmpty());
+}
+
+TEST(HostileScene, TheSmallestAndTheNarrowestSheetHang) {
+  for (const auto& [rows, columns] : {std::pair(2, 2), {2, 500}, {500, 2}}) {
+    SheetDefinition sheet = held(flat_sheet(rows, columns, 0.01));
+    for (const Scene& each : on_every_solver(scene_of(sheet))) {
+      const Simulation simulation = run(each, 30, 8);
+      EXPECT_THAT(simulation.repairs(), IsEmpty());
+    }
+  }
+}
+
+TEST(HostileScene, OneSegmentBendsStrongerThanTheCurve) {
+  SheetDefinition sheet = held(flat_sheet(9, 9));
+  for (const bool folded : {false, true}) {
+    sheet.bending = ChoiKo{.segments = 1, .fold_clamp = folded};
+    for (const Scene& each : on_every_solver(scene_of(sheet)))
+      EXPECT_LT(run(each, 100, 1).stats().largest_strain, 0.2);
+  }
+}
+
+TEST(HostileScene, AStepForcedTo100MillisecondsIsRefusedOrRepaired) {
+  Scene scene = scene_of(held(flat_sheet(9, 9)));
+  scene.solver.frame_step = scene.solver.substep.emplace(0.1);
+  EXPECT_TRUE(Simulation(scene).refusal());
+  scene.solver.allow_unstable = true;
+  for (const Scene& each : on_every_solver(scene)) {
+    const Simulation simulation = run(each, 30, 2);
+    EXPECT_GE(simulation.repairs().size(), 5u);
+    EXPECT_LT(simulation.stats().largest_strain, 0.5);
+  }
+}
+
+// Each integrator, forced to a step that is 20 times too long.
+TEST(HostileScene, EveryIntegratorIsRepaired) {
+  for (const auto kind : {IntegratorKind::kVerlet, IntegratorKind::kEuler,
+                          IntegratorKind::kMidpoint, IntegratorKind::kRk4}) {
+    SheetDefinition sheet = held(flat_sheet(5, 5));
+    sheet.textile.damping = 0.05;
+    Scene scene = scene_of(sheet);
+    scene.solver.integrator = kind;
+    scene.solver.substep = 0.01;
+    scene.solver.allow_unstable = true;
+    EXPECT_FALSE(run(scene, 100, 1).repairs().empty());
+  }
+}
+
+}  // namespace
+}  // namespace weft::testing

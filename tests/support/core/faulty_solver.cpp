@@ -1,0 +1,62 @@
+#include "tests/support/core/faulty_solver.h"
+
+#include <memory>
+#include <utility>
+
+#include "core/motion/sheet_solver.h"
+
+namespace weft::testing {
+namespace {
+
+class FaultySolver : public SheetSolver {
+ public:
+  FaultySolver(std::unique_ptr<SheetSolver> solver, double from, double jump,
+               std::shared_ptr<int> times)
+      : solver_(std::move(solver)), from_(from), jump_(jump), times_(std::move(times)) {}
+
+  void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
+    struck_ = false;
+    solver_->start(x, v, time, dt);
+  }
+  void advance(double time) override {
+    solver_->advance(time);
+    if (time < from_ || *times_ == 0 || std::exchange(struck_, true)) return;
+    --*times_;
+    Matrix3Xd x;
+    solver_->positions(x);
+    const auto middle = static_cast<int>(x.cols() / 2);
+    const Vector3d jump(0, jump_, 0);
+    solver_->lead(middle, x.col(middle) + jump, jump);
+  }
+  void lead(int particle, const Vector3d& x, const Vector3d& d) override {
+    solver_->lead(particle, x, d);
+  }
+  void resolve(const Contacts& contacts) override { solver_->resolve(contacts); }
+  bool finite() const override { return solver_->finite(); }
+  void positions(Matrix3Xd& x) const override { solver_->positions(x); }
+  void velocities(Matrix3Xd& v) const override { solver_->velocities(v); }
+  void closing_velocities(double time, Matrix3Xd& v) override {
+    solver_->closing_velocities(time, v);
+  }
+
+ private:
+  std::unique_ptr<SheetSolver> solver_;
+  double from_;                 // s
+  double jump_;                 // m
+  std::shared_ptr<int> times_;  // still to strike
+  bool struck_ = false;         // since it started
+};
+
+}  // namespace
+
+SolverFactory faulty_solvers(const Fault& fault) {
+  return [fault, times = std::make_shared<int>(fault.times)](
+             const Scene& scene, const SheetDefinition& sheet, const Dynamics& dynamics) {
+    // half a frame before the end of it
+    const double from = (static_cast<double>(fault.frame) - 0.5) * scene.solver.frame_step;
+    return std::make_unique<FaultySolver>(make_solver(scene, sheet, dynamics), from, fault.jump,
+                                          times);
+  };
+}
+
+}  // namespace weft::testing

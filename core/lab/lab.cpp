@@ -16,7 +16,7 @@ namespace {
 constexpr int kMostParticles = 6000;  // of a specimen: seconds of Newton's method
 constexpr double kWidth = 0.025;      // of a strip, m: ASTM D1388
 constexpr const char* kChordAngle = "chord angle";
-constexpr const char* kChordAngleStiff = "chord angle, compression resisted";
+constexpr const char* kChordAngleUnshortened = "chord angle, not shortened";
 
 template <class... Parts>
 std::string join(const Parts&... parts) {
@@ -290,7 +290,7 @@ void hang_over(const MeasuredTextile& textile, const LabOrder& order, double ove
   report.curves.push_back(std::move(curve));
   if (!std::holds_alternative<Isometric>(order.bending)) return;
   resist_compression(strip.specimen.mesh);
-  report.values.push_back(strip.angle(kChordAngleStiff, strip.settle(stop, report)));
+  report.values.push_back(strip.angle(kChordAngleUnshortened, strip.settle(stop, report)));
 }
 
 double overhang_of(const MeasuredTextile& textile) {

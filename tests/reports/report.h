@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "client/output/svg.h"
+#include "tests/reports/svg.h"
 
 namespace weft::reports {
 

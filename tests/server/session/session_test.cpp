@@ -224,11 +224,11 @@ TEST(Session, RepairsAFaultInTheMiddleOfARunAndTellsOfIt) {
   std::mutex mutex;
   std::vector<std::string> lines;
   const auto session = std::make_shared<Session>(
-      "test",
+      make_identity("test", "test"),
       Simulation(hung_scene(),
                  faulty_solvers(
                      {.frame = 7, .times = 2, .jump = std::numeric_limits<double>::quiet_NaN()})),
-      kMuchHistory, scheduler, [&](const std::string& line) {
+      kMuchHistory, scheduler, std::make_unique<NoLog>(), [&](const std::string& line) {
         std::lock_guard lock(mutex);
         lines.push_back(line);
       });
@@ -252,8 +252,9 @@ TEST(Session, RepairsAFaultInTheMiddleOfARunAndTellsOfIt) {
 TEST(Session, FailsWhenRepairsAreUsedUpWithItsLastGoodFrameReadable) {
   Scheduler scheduler(2);
   const auto session = std::make_shared<Session>(
-      "test", Simulation(hung_scene(), faulty_solvers({.frame = 7, .times = 1000, .jump = 1e300})),
-      kMuchHistory, scheduler);
+      make_identity("test", "test"),
+      Simulation(hung_scene(), faulty_solvers({.frame = 7, .times = 1000, .jump = 1e300})),
+      kMuchHistory, scheduler, std::make_unique<NoLog>());
   const auto watcher = Watcher::of(*session, 1);
   EXPECT_EQ(step(*session, 20).refused(), Refusal::Why::kFailed);
   const SessionStatus status = session->status();

@@ -1,4 +1,4 @@
-#include "client/output/svg.h"
+#include "tests/reports/svg.h"
 
 #include <fmt/format.h>
 

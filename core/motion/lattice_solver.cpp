@@ -1,4 +1,3 @@
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -29,13 +28,13 @@ class LatticeSolver : public SheetSolver {
     // half a kick: x(-dt) = x - v dt + a dt^2 / 2
     Matrix3Xd a;
     accelerate(dynamics_, time, x, v, a);
-    for (int i = 0; i < particles_; ++i) {
-      set_position(i, x.col(i));
-      set_displacement(i, v.col(i) * dt - a.col(i) * (dt * dt / 2));
+    for_each_particle([&](int i, Place at) {
+      set_position(at, x.col(i));
+      set_displacement(at, v.col(i) * dt - a.col(i) * (dt * dt / 2));
       for (int axis = 0; axis < 3; ++axis)
-        at(State::kW, axis, i) = static_cast<T>(v(axis, i) * 2 * dt);
-      at(State::kStep2, 0, i) = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
-    }
+        value(State::kW + axis, at) = static_cast<T>(v(axis, i) * 2 * dt);
+      value(State::kStep2, at) = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
+    });
     std::fill(gap_.begin(), gap_.end(), 0);
   }
 
@@ -52,10 +51,11 @@ class LatticeSolver : public SheetSolver {
   }
 
   void lead(int particle, const Vector3d& x, const Vector3d& d) override {
-    set_position(particle, x);
+    const Place at{particle / columns_, particle % columns_};
+    set_position(at, x);
     for (int axis = 0; axis < 3; ++axis)
-      at(State::kW, axis, particle) = static_cast<T>(3 * d[axis]) - at(State::kD, axis, particle);
-    set_displacement(particle, d);
+      value(State::kW + axis, at) = static_cast<T>(3 * d[axis]) - value(State::kD + axis, at);
+    set_displacement(at, d);
   }
 
   // A row is looked at again when it, or a collider, may have come as far as its gap was wide.
@@ -71,21 +71,16 @@ class LatticeSolver : public SheetSolver {
     }
   }
 
-  bool finite() const override {
-    for (int i = 0; i < particles_; ++i)
-      for (int plane = 0; plane < state_.planes(); ++plane)
-        if (!std::isfinite(at(plane, 0, i))) return false;
-    return true;
-  }
-
   void positions(Matrix3Xd& x) const override {
     x.resize(3, particles_);
-    for (int i = 0; i < particles_; ++i) x.col(i) = position(i);
+    for_each_particle([&](int i, Place at) { x.col(i) = position(at); });
   }
   void velocities(Matrix3Xd& v) const override {
     v.resize(3, particles_);
-    for (int i = 0; i < particles_; ++i)
-      for (int axis = 0; axis < 3; ++axis) v(axis, i) = double{at(State::kW, axis, i)} / (2 * dt_);
+    for_each_particle([&](int i, Place at) {
+      for (int axis = 0; axis < 3; ++axis)
+        v(axis, i) = double{value(State::kW + axis, at)} / (2 * dt_);
+    });
   }
   // v = d / dt + a dt / 2: d stands for the velocity half a step ago
   void closing_velocities(double time, Matrix3Xd& v) override {
@@ -93,37 +88,44 @@ class LatticeSolver : public SheetSolver {
     positions(x);
     velocities(v);
     accelerate(dynamics_, time, x, v, a);
-    for (int i = 0; i < particles_; ++i) v.col(i) = displacement(i) / dt_ + a.col(i) * (dt_ / 2);
+    for_each_particle(
+        [&](int i, Place at) { v.col(i) = displacement(at) / dt_ + a.col(i) * (dt_ / 2); });
   }
 
  private:
   using State = SweepState<T>;
 
-  T& at(int plane, int axis, int i) { return state_.at(plane + axis, i / columns_, i % columns_); }
-  const T& at(int plane, int axis, int i) const {
-    return state_.at(plane + axis, i / columns_, i % columns_);
+  struct Place {
+    int row, column;
+  };
+  template <class F>
+  void for_each_particle(const F& f) const {
+    for (int r = 0, i = 0; r < law_.layout.rows; ++r)
+      for (int c = 0; c < columns_; ++c, ++i) f(i, Place{r, c});
   }
+  T& value(int plane, Place at) { return state_.at(plane, at.row, at.column); }
+  const T& value(int plane, Place at) const { return state_.at(plane, at.row, at.column); }
 
-  Vector3d value(int plane, int error, int i) const {
+  Vector3d exact(int plane, int error, Place at) const {
     Vector3d out;
     for (int axis = 0; axis < 3; ++axis) {
-      out[axis] = at(plane, axis, i);
-      if (law_.compensated) out[axis] -= double{at(error, axis, i)};
+      out[axis] = value(plane + axis, at);
+      if (law_.compensated) out[axis] -= double{value(error + axis, at)};
     }
     return out;
   }
-  void set_value(int plane, int error, int i, const Vector3d& exact) {
+  void set(int plane, int error, Place at, const Vector3d& exact) {
     for (int axis = 0; axis < 3; ++axis) {
-      const T rounded = at(plane, axis, i) = static_cast<T>(exact[axis]);
-      if (law_.compensated) at(error, axis, i) = static_cast<T>(double{rounded} - exact[axis]);
+      const T rounded = value(plane + axis, at) = static_cast<T>(exact[axis]);
+      if (law_.compensated) value(error + axis, at) = static_cast<T>(double{rounded} - exact[axis]);
     }
   }
-  Vector3d position(int i) const { return origin_ + value(State::kX, State::kXError, i); }
-  Vector3d displacement(int i) const { return value(State::kD, State::kDError, i); }
-  void set_position(int i, const Vector3d& x) {
-    set_value(State::kX, State::kXError, i, x - origin_);
+  Vector3d position(Place at) const { return origin_ + exact(State::kX, State::kXError, at); }
+  Vector3d displacement(Place at) const { return exact(State::kD, State::kDError, at); }
+  void set_position(Place at, const Vector3d& x) {
+    set(State::kX, State::kXError, at, x - origin_);
   }
-  void set_displacement(int i, const Vector3d& d) { set_value(State::kD, State::kDError, i, d); }
+  void set_displacement(Place at, const Vector3d& d) { set(State::kD, State::kDError, at, d); }
 
   // Drag over mass is one for all particles: both go by area, 1/s.
   double drag_rate() const {
@@ -136,19 +138,19 @@ class LatticeSolver : public SheetSolver {
   double resolve_row(const Contacts& contacts, int r) {
     double nearest = std::numeric_limits<double>::infinity();
     for (int c = 0; c < columns_; ++c) {
-      const int i = r * columns_ + c;
-      if (dynamics_.inverse_mass[i] == 0) continue;
-      Vector3d x = position(i);
+      const Place at{r, c};
+      if (dynamics_.inverse_mass[r * columns_ + c] == 0) continue;
+      Vector3d x = position(at);
       const double gap = contacts.gap(x);
       nearest = std::min(nearest, gap);
       if (gap >= 0) continue;
-      const Vector3d before = displacement(i);
+      const Vector3d before = displacement(at);
       Vector3d d = before;
       contacts.resolve(x, d);
-      set_position(i, x);
-      set_displacement(i, d);
+      set_position(at, x);
+      set_displacement(at, d);
       for (int axis = 0; axis < 3; ++axis)
-        at(State::kW, axis, i) += static_cast<T>(3 * (d[axis] - before[axis]));
+        value(State::kW + axis, at) += static_cast<T>(3 * (d[axis] - before[axis]));
     }
     return nearest;
   }

@@ -31,7 +31,6 @@ class PlainSolver : public SheetSolver {
     }
   }
 
-  bool finite() const override { return motion_.x.allFinite() && motion_.d.allFinite(); }
   void positions(Matrix3Xd& x) const override { x = motion_.x; }
   void velocities(Matrix3Xd& v) const override { integrator_->velocity(motion_, dt_, v); }
   void closing_velocities(double time, Matrix3Xd& v) override {

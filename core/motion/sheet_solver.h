@@ -24,7 +24,6 @@ class SheetSolver {
   // Moves free particles out of colliders.
   virtual void resolve(const Contacts& contacts) = 0;
 
-  virtual bool finite() const = 0;
   // Present state: m, m/s.
   virtual void positions(Matrix3Xd& x) const = 0;
   virtual void velocities(Matrix3Xd& v) const = 0;

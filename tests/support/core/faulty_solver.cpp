@@ -32,7 +32,6 @@ class FaultySolver : public SheetSolver {
     solver_->lead(particle, x, d);
   }
   void resolve(const Contacts& contacts) override { solver_->resolve(contacts); }
-  bool finite() const override { return solver_->finite(); }
   void positions(Matrix3Xd& x) const override { solver_->positions(x); }
   void velocities(Matrix3Xd& v) const override { solver_->velocities(v); }
   void closing_velocities(double time, Matrix3Xd& v) override {

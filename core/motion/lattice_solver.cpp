@@ -23,7 +23,11 @@ class LatticeSolver : public SheetSolver {
 
   void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
     dt_ = dt;
-    if (law_.compensated && !std::exchange(started_, true)) origin_ = x.rowwise().mean();
+    if (law_.compensated && !std::exchange(started_, true)) {
+      // one after the other: reductions add in an order that depends on where origin_ lies
+      for (const auto& position : x.colwise()) origin_ += position;
+      origin_ /= particles_;
+    }
     law_.damping = static_cast<T>(damping_ / (2 * dt));
     // half a kick: x(-dt) = x - v dt + a dt^2 / 2
     Matrix3Xd a;

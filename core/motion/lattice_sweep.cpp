@@ -511,7 +511,12 @@ SweepState<T>::SweepState(const LatticeLayout<T>& layout, bool compensated)
     : layout_(layout),
       planes_(compensated ? kDError + 3 : kXError),
       seen_(static_cast<std::size_t>(layout.rows * seen_row() + 2 * kMargin)),
-      own_(static_cast<std::size_t>(layout.rows * own_row())) {}
+      own_(static_cast<std::size_t>(layout.rows * own_row())) {
+  for (int c = 0; c < layout.vectors() * LatticeLayout<T>::kLanes; ++c) {
+    const std::ptrdiff_t vector = layout.vector(c), lane = layout.lane(c);
+    columns_.push_back({vector * kSeenStride + lane, vector * own_stride() - kSeenStride + lane});
+  }
+}
 
 template class AlignedArray<float>;
 template class AlignedArray<double>;

@@ -137,10 +137,11 @@ class SweepState {
   T* seen(int r) { return seen_.data() + kMargin + r * seen_row(); }
   T* own(int r) { return own_.data() + r * own_row(); }
 
+  // Column c of row r; also columns beyond the last, as far as vectors reach.
   T& at(int plane, int r, int c) {
-    T* const vector = plane < kSeen ? seen(r) + layout_.vector(c) * kSeenStride
-                                    : own(r) + layout_.vector(c) * own_stride() - kSeenStride;
-    return vector[plane * LatticeLayout<T>::kLanes + layout_.lane(c)];
+    const Column& column = columns_[static_cast<std::size_t>(c)];
+    T* const vector = plane < kSeen ? seen(r) + column.seen : own(r) + column.own;
+    return vector[plane * LatticeLayout<T>::kLanes];
   }
   const T& at(int plane, int r, int c) const {
     return const_cast<SweepState*>(this)->at(plane, r, c);
@@ -153,8 +154,12 @@ class SweepState {
   }
   std::ptrdiff_t own_row() const { return layout_.vectors() * own_stride(); }
 
+  struct Column {
+    std::ptrdiff_t seen, own;  // where it is in the row, for plane 0
+  };
   LatticeLayout<T> layout_;
   int planes_;
+  std::vector<Column> columns_;
   AlignedArray<T> seen_, own_;
 };
 

@@ -40,8 +40,8 @@ void Page::table(const std::vector<std::string>& columns,
   markdown_ += '\n';
 }
 
-void Page::plot(const std::string& name, const client::Plot& plot) {
-  write_file(folder_ / (name + ".svg"), client::svg_text(plot));
+void Page::plot(const std::string& name, const Plot& plot) {
+  write_file(folder_ / (name + ".svg"), svg_text(plot));
   markdown_ += fmt::format("![{}]({}.svg)\n\n", plot.title, name);
 }
 
@@ -65,13 +65,11 @@ std::string number(double value) { return fmt::format("{:.4g}", value); }
 
 int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
-  if (arguments.size() < 3 || (arguments[0] != "accuracy" && arguments[0] != "stability")) {
-    std::cerr << "usage: weft-report accuracy|stability FOLDER COMMIT [--large]\n";
+  if (arguments.size() < 3 || arguments[0] != "stability") {
+    std::cerr << "usage: weft-report stability FOLDER COMMIT [--large]\n";
     return 2;
   }
   const bool large = arguments.size() > 3 && arguments[3] == "--large";
-  const auto report =
-      arguments[0] == "accuracy" ? weft::reports::accuracy : weft::reports::stability;
-  report(arguments[1], arguments[2], large);
+  weft::reports::stability(arguments[1], arguments[2], large);
   std::cout << arguments[1] << "/README.md\n";
 }

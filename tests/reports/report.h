@@ -18,7 +18,7 @@ class Page {
   // The same table in Markdown, of the rows and columns given.
   void table(const std::vector<std::string>& columns,
              const std::vector<std::vector<std::string>>& rows);
-  void plot(const std::string& name, const client::Plot& plot);
+  void plot(const std::string& name, const Plot& plot);
   // Writes NAME.csv and README.md.
   void write() const;
 
@@ -31,8 +31,7 @@ class Page {
 std::string machine(const std::string& commit);
 std::string number(double value);
 
-// Each writes a page; `large` for finer meshes and more cases.
-void accuracy(const std::filesystem::path& folder, const std::string& commit, bool large);
+// Writes a page; `large` for finer meshes and more cases.
 void stability(const std::filesystem::path& folder, const std::string& commit, bool large);
 
 }  // namespace weft::reports

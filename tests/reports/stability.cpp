@@ -82,7 +82,7 @@ class Report {
            const std::vector<std::pair<double, SheetDefinition>>& sheets) {
     page_.text("## " + title);
     std::vector<std::vector<std::string>> rows;
-    client::Plot plot{title, "log10 of " + name, "log10 of the step in s", {}, true, false};
+    Plot plot{title, "log10 of " + name, "log10 of the step in s", {}, true, false};
     plot.series = {{"linear bound", {}}, {"estimate", {}}, {"measured", {}}};
     for (const auto& [value, sheet] : sheets) {
       const StepPlan plan = Simulation(scene_of(sheet)).plan().step;

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <iterator>
 
-namespace weft::client {
+namespace weft::reports {
 namespace {
 
 constexpr double kWidth = 720, kHeight = 480;
@@ -141,4 +141,4 @@ std::string svg_text(const Plot& plot) {
   return svg + "</svg>\n";
 }
 
-}  // namespace weft::client
+}  // namespace weft::reports

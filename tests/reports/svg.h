@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace weft::client {
+namespace weft::reports {
 
 // Points joined by a line.
 struct Series {
@@ -23,4 +23,4 @@ struct Plot {
 // The plot as an SVG document of 720 x 480.
 std::string svg_text(const Plot& plot);
 
-}  // namespace weft::client
+}  // namespace weft::reports

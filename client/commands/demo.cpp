@@ -15,7 +15,7 @@
 namespace weft::client {
 namespace {
 
-struct Options {
+struct DemoOptions {
   std::string directory = "weft-demo";
   double longest_time_s = 30;
 };
@@ -30,7 +30,7 @@ struct Run {
   Tally tally;
 };
 
-std::vector<Run> plan_runs(const Options& options) {
+std::vector<Run> plan_runs(const DemoOptions& options) {
   std::vector<Run> runs;
   const auto add = [&](const char* experiment, std::optional<double> bend) {
     TemplateOptions values;
@@ -145,7 +145,7 @@ Json runs_json(const std::vector<Run>& runs) {
   return {{"runs", std::move(json)}};
 }
 
-void run_demo(Context& context, const Options& options) {
+void run_demo(Context& context, const DemoOptions& options) {
   context.embedded = true;
   std::error_code error;
   std::filesystem::create_directories(options.directory, error);
@@ -158,7 +158,7 @@ void run_demo(Context& context, const Options& options) {
 }  // namespace
 
 void add_demo(CLI::App& app, Context& context) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DemoOptions>();
   CLI::App* command = app.add_subcommand(
       "demo", "Run the paper's experiments 1 to 3 on a server within this command");
   command->add_option("-o,--output", options->directory, "Directory for recordings and exports")

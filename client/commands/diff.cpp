@@ -8,7 +8,7 @@
 namespace weft::client {
 namespace {
 
-struct Options {
+struct DiffOptions {
   std::string a;
   std::string b;
   std::string frames;
@@ -71,7 +71,7 @@ void check_within(const RecordingReader& a, const RecordingReader& b, const Comp
     fail(fmt::format("frame {} is not equal to the bit", *found.first_unequal));
 }
 
-void run(Context& context, const Options& options) {
+void run_diff(Context& context, const DiffOptions& options) {
   RecordingReader a(options.a);
   RecordingReader b(options.b);
   Status status(context.terminal.err, context.terminal.err_is_watched);
@@ -86,7 +86,7 @@ void run(Context& context, const Options& options) {
 }  // namespace
 
 void add_diff(CLI::App& app, Context& context) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DiffOptions>();
   CLI::App* command = app.add_subcommand("diff", "Say how far two recordings lie apart, and where");
   command->add_option("A", options->a, "Recording")->option_text(" ")->required();
   command->add_option("B", options->b, "Recording of equal sheets and frame step")
@@ -99,7 +99,7 @@ void add_diff(CLI::App& app, Context& context) {
                    "Fail unless all frames match this closely, m; 0: to the bit")
       ->type_name("M")
       ->check(CLI::NonNegativeNumber);
-  command->callback([&context, options] { run(context, *options); });
+  command->callback([&context, options] { run_diff(context, *options); });
 }
 
 }  // namespace weft::client

@@ -9,13 +9,13 @@
 namespace weft::client {
 namespace {
 
-struct Options {
+struct ExportOptions {
   std::string recording;
   std::string frames;
   ExportOrder order;
 };
 
-void run(Context& context, const Options& options) {
+void run_export(Context& context, const ExportOptions& options) {
   ExportOrder order = options.order;
   order.frames = read_frame_range(options.frames);
   RecordingReader recording(options.recording);
@@ -35,7 +35,7 @@ void run(Context& context, const Options& options) {
 void add_export(CLI::App& app, Context& context) {
   const std::map<std::string, ExportFormat> formats{
       {"obj", ExportFormat::kObj}, {"pc2", ExportFormat::kPc2}, {"csv", ExportFormat::kCsv}};
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExportOptions>();
   ExportOrder& order = options->order;
   CLI::App* command =
       app.add_subcommand("export", "Write a recording as files that other tools open");
@@ -59,7 +59,7 @@ void add_export(CLI::App& app, Context& context) {
       ->delimiter(',')
       ->allow_extra_args(false)
       ->excludes(frames);
-  command->callback([&context, options] { run(context, *options); });
+  command->callback([&context, options] { run_export(context, *options); });
 }
 
 }  // namespace weft::client

@@ -75,7 +75,7 @@ Json facts_json(const RecordingReader& recording, const Inspection& inspection) 
           {"faults", inspection.faults.size()}};
 }
 
-void run(Context& context, const std::string& path) {
+void run_info(Context& context, const std::string& path) {
   RecordingReader recording(path);
   Status status(context.terminal.err, context.terminal.err_is_watched);
   const Inspection inspection = inspect(recording, [&](std::int64_t frame) {
@@ -93,7 +93,7 @@ void add_info(CLI::App& app, Context& context) {
   CLI::App* command =
       app.add_subcommand("info", "Say what a recording holds, and check every frame of it");
   command->add_option("FILE", *path, "Recording")->option_text(" ")->required();
-  command->callback([&context, path] { run(context, *path); });
+  command->callback([&context, path] { run_info(context, *path); });
 }
 
 }  // namespace weft::client

@@ -5,7 +5,7 @@
 namespace weft::client {
 namespace {
 
-void run(Context& context, const std::string& session) {
+void run_pause(Context& context, const std::string& session) {
   v1::PauseSessionRequest request;
   request.set_name(context.session_name(session));
   const auto response = context.connection().call(&Sessions::PauseSession, request);
@@ -20,7 +20,7 @@ void add_pause(CLI::App& app, Context& context) {
   CLI::App* command =
       app.add_subcommand("pause", "Stop a running session after the frame it computes");
   add_session_argument(*command, *session);
-  command->callback([&context, session] { run(context, *session); });
+  command->callback([&context, session] { run_pause(context, *session); });
 }
 
 }  // namespace weft::client

@@ -9,7 +9,7 @@
 namespace weft::client {
 namespace {
 
-struct Options {
+struct RecordOptions {
   RecordingOrder order;
   std::int64_t patience_s = 60;
 };
@@ -52,7 +52,7 @@ void answer(Context& context, const RecordingOrder& order, const RecordingResult
   context.answer(json, text + '\n');
 }
 
-void run(Context& context, const Options& options) {
+void run_record(Context& context, const RecordOptions& options) {
   RecordingOrder order = options.order;
   order.session = context.session_or_scene(order.session);
   order.run = order.run || context.embedded;
@@ -74,7 +74,7 @@ void run(Context& context, const Options& options) {
 void add_record(CLI::App& app, Context& context) {
   const std::map<std::string, v1::FrameEncoding> encodings{{"float32", v1::FRAME_ENCODING_FLOAT32},
                                                            {"float64", v1::FRAME_ENCODING_FLOAT64}};
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RecordOptions>();
   RecordingOrder& order = options->order;
   CLI::App* command =
       app.add_subcommand("record", "Record the frames of a session to a file, losing none");
@@ -101,7 +101,7 @@ void add_record(CLI::App& app, Context& context) {
   command->footer(
       "Without --to and --until-rest it ends when the session, having advanced, is paused.\n"
       "Ctrl-C ends it at any time; the file holds what came so far.");
-  command->callback([&context, options] { run(context, *options); });
+  command->callback([&context, options] { run_record(context, *options); });
 }
 
 }  // namespace weft::client

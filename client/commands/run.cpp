@@ -8,7 +8,7 @@
 namespace weft::client {
 namespace {
 
-struct Options {
+struct RunOptions {
   std::string session;
   std::optional<double> time_scale;
   std::optional<std::int64_t> until_frame;
@@ -36,7 +36,7 @@ v1::Progress wait_for_end(Context& context, const std::string& session) {
   throw interrupted();
 }
 
-void run(Context& context, const Options& options) {
+void run_freely(Context& context, const RunOptions& options) {
   v1::RunSessionRequest request;
   request.set_name(context.session_or_scene(options.session));
   if (options.time_scale) request.set_time_scale(*options.time_scale);
@@ -65,7 +65,7 @@ void run(Context& context, const Options& options) {
 }  // namespace
 
 void add_run(CLI::App& app, Context& context) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RunOptions>();
   CLI::App* command = app.add_subcommand("run", "Let a session advance by itself");
   add_session_or_scene_argument(*command, options->session);
   command
@@ -77,7 +77,7 @@ void add_run(CLI::App& app, Context& context) {
   command->add_flag("--until-rest", options->until_rest, "Pause at rest");
   command->add_flag("--wait", options->wait,
                     "Wait until it is paused again (always with --embedded)");
-  command->callback([&context, options] { run(context, *options); });
+  command->callback([&context, options] { run_freely(context, *options); });
 }
 
 }  // namespace weft::client

@@ -16,7 +16,7 @@
 namespace weft::client {
 namespace {
 
-struct Options {
+struct ScriptOptions {
   std::string path;
   std::vector<std::string> values;  // "k_b=0.1"
   std::string junit;
@@ -90,7 +90,7 @@ std::vector<CaseResult> perform_all(Context& context, const Script& script, bool
   return results;
 }
 
-void run(Context& context, const Options& options) {
+void run_script(Context& context, const ScriptOptions& options) {
   const Script script = read_script(options.path, read_values(options.values));
   check_script(context.connection(), script, options.replace);
   if (options.dry_run) return answer_plan(context, script);
@@ -141,7 +141,7 @@ $case for the case's name. Paths are relative to the script. Sessions end with t
 }  // namespace
 
 void add_script(CLI::App& app, Context& context) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ScriptOptions>();
   CLI::App* command =
       app.add_subcommand("script", "Run sessions as a file says, and hold them to what it expects");
   command->add_option("FILE", options->path, "Script")->option_text(" ")->required();
@@ -153,7 +153,7 @@ void add_script(CLI::App& app, Context& context) {
       ->type_name("FILE");
   command->add_flag("--force", options->replace, "Replace recordings that exist");
   command->footer(kFooter);
-  command->callback([&context, options] { run(context, *options); });
+  command->callback([&context, options] { run_script(context, *options); });
 }
 
 }  // namespace weft::client

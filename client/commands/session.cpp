@@ -18,7 +18,7 @@ void run_create(Context& context, const CreateOptions& options) {
   context.answer(to_json(session), "created " + session.name() + '\n' + plan_text(session.plan()));
 }
 
-void run_list(Context& context) {
+void list_sessions(Context& context) {
   v1::ListSessionsRequest request;
   v1::ListSessionsResponse all;
   do {
@@ -68,7 +68,7 @@ void add_session(CLI::App& app, Context& context) {
   command->callback([&context, create] { run_create(context, *create); });
 
   command = session->add_subcommand("list", "List all sessions");
-  command->callback([&context] { run_list(context); });
+  command->callback([&context] { list_sessions(context); });
 
   auto name = std::make_shared<std::string>();
   command = session->add_subcommand("get", "Show one session");

@@ -6,13 +6,13 @@
 namespace weft::client {
 namespace {
 
-struct Options {
+struct StepOptions {
   std::string session;
   std::int64_t frames = 1;
   std::optional<std::int64_t> expected_frame;
 };
 
-void run(Context& context, const Options& options) {
+void run_step(Context& context, const StepOptions& options) {
   v1::StepSessionRequest request;
   request.set_name(context.session_or_scene(options.session));
   request.set_frames(options.frames);
@@ -26,7 +26,7 @@ void run(Context& context, const Options& options) {
 }  // namespace
 
 void add_step(CLI::App& app, Context& context) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<StepOptions>();
   CLI::App* command =
       app.add_subcommand("step", "Compute frames of a paused session and wait for them");
   add_session_or_scene_argument(*command, options->session);
@@ -37,7 +37,7 @@ void add_step(CLI::App& app, Context& context) {
       ->add_option("--expected-frame", options->expected_frame,
                    "Refuse unless this is the newest frame")
       ->type_name("N");
-  command->callback([&context, options] { run(context, *options); });
+  command->callback([&context, options] { run_step(context, *options); });
 }
 
 }  // namespace weft::client

@@ -12,7 +12,7 @@ namespace {
 
 using google::protobuf::FieldDescriptor;
 
-void run_list(Context& context) {
+void list_textiles(Context& context) {
   const auto all = context.connection().call(&Textiles::ListTextiles, v1::ListTextilesRequest());
   Table table({"NAME", "TEXTILE", "kg/m^2", "STATUS"});
   for (const auto& textile : all.textiles()) {
@@ -110,7 +110,7 @@ void add_textile(CLI::App& app, Context& context) {
       add_group(app, "textile", "Show textile presets, change the textile of a session");
 
   CLI::App* command = textile->add_subcommand("list", "List the presets");
-  command->callback([&context] { run_list(context); });
+  command->callback([&context] { list_textiles(context); });
 
   auto name = std::make_shared<std::string>();
   command = textile->add_subcommand("show", "Show a preset, every number with its source");

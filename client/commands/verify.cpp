@@ -8,7 +8,7 @@
 namespace weft::client {
 namespace {
 
-void run(Context& context, const std::string& path) {
+void run_verify(Context& context, const std::string& path) {
   RecordingReader recording(path);
   Status status(context.terminal.err, context.terminal.err_is_watched);
   const Inspection inspection = inspect(recording, [&](std::int64_t frame) {
@@ -35,7 +35,7 @@ void add_verify(CLI::App& app, Context& context) {
   CLI::App* command = app.add_subcommand(
       "verify", "Read all of a recording and hold it to its checksums, or say all that is wrong");
   command->add_option("FILE", *path, "Recording")->option_text(" ")->required();
-  command->callback([&context, path] { run(context, *path); });
+  command->callback([&context, path] { run_verify(context, *path); });
 }
 
 }  // namespace weft::client

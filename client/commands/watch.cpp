@@ -11,14 +11,14 @@
 namespace weft::client {
 namespace {
 
-struct Options {
+struct WatchOptions {
   std::string session;
   std::optional<std::int64_t> to;
   bool until_rest = false;
   bool run = false;
 };
 
-v1::StreamFramesRequest stream_request(const std::string& session, const Options& options) {
+v1::StreamFramesRequest stream_request(const std::string& session, const WatchOptions& options) {
   v1::StreamFramesRequest request;
   request.set_session(session);
   if (options.to) request.set_end_frame(*options.to);
@@ -26,7 +26,7 @@ v1::StreamFramesRequest stream_request(const std::string& session, const Options
   return request;
 }
 
-void let_run(Context& context, const std::string& session, const Options& options) {
+void let_run(Context& context, const std::string& session, const WatchOptions& options) {
   v1::RunSessionRequest request;
   request.set_name(session);
   if (options.to) request.set_until_frame(*options.to);
@@ -116,8 +116,8 @@ class View {
 };
 
 // Watches until the end; false: the watcher was too slow and must begin anew at the newest frame.
-bool watch(Context& context, const std::string& session, const Options& options, bool& to_be_run,
-           View& view) try {
+bool watch(Context& context, const std::string& session, const WatchOptions& options,
+           bool& to_be_run, View& view) try {
   FrameFeed feed(context.connection(), stream_request(session, options), std::chrono::seconds(60));
   while (const auto message = feed.next()) {
     if (message->has_header() && std::exchange(to_be_run, false))
@@ -132,7 +132,7 @@ bool watch(Context& context, const std::string& session, const Options& options,
   return false;
 }
 
-void run(Context& context, const Options& options) {
+void run_watch(Context& context, const WatchOptions& options) {
   const std::string session = context.session_or_scene(options.session);
   bool to_be_run = options.run || context.embedded;
   View view(context);
@@ -146,7 +146,7 @@ void run(Context& context, const Options& options) {
 }  // namespace
 
 void add_watch(CLI::App& app, Context& context) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<WatchOptions>();
   CLI::App* command =
       app.add_subcommand("watch", "Show a session's frames as they come, until Ctrl-C");
   add_session_or_scene_argument(*command, options->session);
@@ -154,7 +154,7 @@ void add_watch(CLI::App& app, Context& context) {
   command->add_flag("--until-rest", options->until_rest, "End at rest");
   command->add_flag("--run", options->run,
                     "Let the session run, as far as it is watched (always with --embedded)");
-  command->callback([&context, options] { run(context, *options); });
+  command->callback([&context, options] { run_watch(context, *options); });
 }
 
 }  // namespace weft::client

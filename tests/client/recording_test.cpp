@@ -120,20 +120,20 @@ TEST_F(RecordingTest, OfASolverThatGaveUpHasEveryGoodFrame) {
 }
 
 TEST_F(RecordingTest, ResumesBrokenConnectionsWithEveryFrameOnce) {
-  constexpr std::int64_t kLast = 400;
+  constexpr std::int64_t kFrames = 400;
   const BreakingProxy proxy(address_, 4, 30'000);
   Outcome outcome;
   std::thread recording([&] {
-    outcome = run_weft({"record", "cloth", "--to", std::to_string(kLast), "-o", file_, "--json",
+    outcome = run_weft({"record", "cloth", "--to", std::to_string(kFrames), "-o", file_, "--json",
                         "--server", proxy.address()});
   });
   await_frame(file_, 0);
-  service_.run(session_, kLast);
+  service_.run(session_, kFrames);
   recording.join();
   ASSERT_EQ(outcome.exit, 0) << outcome.err;
   EXPECT_EQ(proxy.broken(), 4);
   EXPECT_GE(outcome.json()["reconnections"], 4);
-  expect_equal(recorded(file_), stream("sessions/cloth", 0, kLast));
+  expect_equal(recorded(file_), stream("sessions/cloth", 0, kFrames));
 }
 
 TEST_F(RecordingTest, GivesUpOnAServerThatIsGoneAndKeepsWhatItHas) {

@@ -202,7 +202,7 @@ TEST_F(RestartedWeftd, KilledAtRandomMomentsLosesNoCallAndNoFrame) {
 // Frames that were seen stay as they were, and so does where each call took effect.
 TEST_F(RestartedWeftd, KilledInARunChangesNoFrameThatWasSeen) {
   constexpr int kKills = 5, kCalls = 60;
-  constexpr std::int64_t kLast = 2400;
+  constexpr std::int64_t kFrames = 2400;
   std::mt19937 random(5);
   start();
   const auto current = [this] { return stub(); };
@@ -223,12 +223,12 @@ TEST_F(RestartedWeftd, KilledInARunChangesNoFrameThatWasSeen) {
   Outcome recorded;
   std::jthread recorder([&] {
     recorded =
-        run_weft({"record", "cloth", "--from", "0", "--to", std::to_string(kLast), "--encoding",
+        run_weft({"record", "cloth", "--from", "0", "--to", std::to_string(kFrames), "--encoding",
                   "float64", "-o", path("cloth.weft"), "--server", address(), "--json"});
   });
   v1::RunSessionRequest run;
   run.set_name(session.name());
-  run.set_until_frame(kLast);
+  run.set_until_frame(kFrames);
   run.set_time_scale(20);
   run.set_request_id("run");
   insist(current, &Sessions::RunSession, run);
@@ -257,15 +257,16 @@ TEST_F(RestartedWeftd, KilledInARunChangesNoFrameThatWasSeen) {
   std::int64_t frame = 0;
   for (int i = 0; i < kCalls; ++i) {
     const std::int64_t before = applied_frames[static_cast<std::size_t>(i)] - 1;
-    if (before >= kLast) break;
+    if (before >= kFrames) break;
     if (before > frame) service_.step(undisturbed, before - frame);
     frame = before;
     EXPECT_EQ(insist(calm, &Sessions::UpdateTextile, set_bend(undisturbed, i)).applied_frame(),
               before + 1);
   }
-  service_.step(undisturbed, kLast - frame);
+  service_.step(undisturbed, kFrames - frame);
   client::RecordingReader reader(path("cloth.weft"));
-  for (const auto& wanted : stream("sessions/undisturbed", 0, kLast, v1::FRAME_ENCODING_FLOAT64)) {
+  for (const auto& wanted :
+       stream("sessions/undisturbed", 0, kFrames, v1::FRAME_ENCODING_FLOAT64)) {
     ASSERT_EQ(reader.read(wanted.number()).SerializeAsString(), wanted.SerializeAsString())
         << "frame " << wanted.number();
   }

@@ -5,7 +5,7 @@
 #include <thread>
 #include <vector>
 
-namespace weft {
+namespace weft::testing {
 namespace {
 
 std::shared_ptr<const Frame> frame_of_100() {
@@ -53,4 +53,4 @@ TEST(FrameEncoding, TakesNoMoreBytesThanIsSaid) {
 }
 
 }  // namespace
-}  // namespace weft
+}  // namespace weft::testing

@@ -10,7 +10,7 @@
 
 #include "server/textiles/catalogue.h"
 
-namespace weft {
+namespace weft::testing {
 namespace {
 
 using ::testing::AnyOf;
@@ -263,4 +263,4 @@ TEST(Textiles, say_what_silk_faille_and_leather_lack) {
 }
 
 }  // namespace
-}  // namespace weft
+}  // namespace weft::testing

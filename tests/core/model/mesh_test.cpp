@@ -12,7 +12,7 @@
 namespace weft::testing {
 namespace {
 
-MeasuredTextile wool() {
+MeasuredTextile worsted() {
   return {.areal_density = 0.168,
           .tensile_warp = 2000,
           .tensile_weft = 1500,
@@ -24,7 +24,7 @@ MeasuredTextile wool() {
 
 SheetDefinition wool_sheet(int rows, int columns, double spacing) {
   SheetDefinition sheet = flat_sheet(rows, columns, spacing);
-  sheet.textile.model = wool();
+  sheet.textile.model = worsted();
   return sheet;
 }
 

@@ -11,14 +11,8 @@
 #include "tests/support/core/scenes.h"
 
 // The vector kernels are held to the plain solver, which evaluates one connection after the other.
-namespace weft {
+namespace weft::testing {
 namespace {
-
-using testing::flat_sheet;
-using testing::floating;
-using testing::noise;
-using testing::positions;
-using testing::velocities;
 
 constexpr int kSteps = 4;
 
@@ -26,8 +20,8 @@ constexpr int kSteps = 4;
 Scene crumpled(SheetDefinition sheet) {
   const double h = sheet.grid.spacing;
   const int n = sheet.particle_count();
-  sheet.start_positions = testing::values(start_positions(sheet) + 0.3 * h * noise(n));
-  sheet.start_velocities = testing::values(0.5 * noise(n, 2));
+  sheet.start_positions = values(start_positions(sheet) + 0.3 * h * noise(n));
+  sheet.start_velocities = values(0.5 * noise(n, 2));
   sheet.pins = {{{0, sheet.grid.columns - 1}, {}}};
   Scene scene = floating(sheet);
   scene.environment.gravity = {0.3, -9.8, 0.1};
@@ -249,4 +243,4 @@ TEST(FarContacts, AreSkippedWithoutMissingOne) {
 }
 
 }  // namespace
-}  // namespace weft
+}  // namespace weft::testing

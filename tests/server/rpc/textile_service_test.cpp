@@ -11,12 +11,12 @@
 #include "google/rpc/status.pb.h"
 #include "server/textiles/catalogue.h"
 
-namespace weft {
+namespace weft::testing {
 namespace {
 
 using google::protobuf::util::MessageDifferencer;
 
-class TextileServiceTest : public testing::Test {
+class TextileServiceTest : public ::testing::Test {
  protected:
   grpc::Status get(const std::string& name, v1::TextilePreset& preset) {
     grpc::ClientContext context;
@@ -90,4 +90,4 @@ TEST_F(TextileServiceTest, refuses_an_empty_name) {
 }
 
 }  // namespace
-}  // namespace weft
+}  // namespace weft::testing

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace weft {
+namespace weft::testing {
 namespace {
 
 constexpr auto kKeepNone = std::numeric_limits<std::int64_t>::max();
@@ -72,4 +72,4 @@ TEST(EncodingCache, MakesEachEncodingOnceAndLetsItGoWithTheFrame) {
 }
 
 }  // namespace
-}  // namespace weft
+}  // namespace weft::testing

@@ -7,7 +7,7 @@
 #include <latch>
 #include <string>
 
-namespace weft {
+namespace weft::testing {
 namespace {
 
 using namespace std::chrono_literals;
@@ -166,4 +166,4 @@ TEST(Scheduler, StopsWhileTasksAreBusy) {
 }
 
 }  // namespace
-}  // namespace weft
+}  // namespace weft::testing

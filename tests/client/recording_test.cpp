@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -32,7 +33,7 @@ class RecordingTest : public ClientTest {
 
   // Waits until a recorder has put the frame into the file.
   void await_frame(const std::string& file, std::int64_t number) const {
-    while (!has_frame(file, number)) std::this_thread::yield();
+    while (!has_frame(file, number)) std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
 
   void expect_equal(const std::vector<v1::Frame>& found, const std::vector<v1::Frame>& wanted) {
@@ -166,22 +167,22 @@ TEST_F(RecordingTest, EndsWhenTheServerLeavesInOrder) {
 TEST_F(RecordingTest, IsReadableAfterItsRecorderWasKilled) {
   std::int64_t killed_after = 100;
   for (int round = 0; round < 3; ++round, killed_after += 700) {
-    const std::string file = path("killed-" + std::to_string(round) + ".weft");
-    Process recorder(
-        "weft",
-        {"record", "cloth", "--from", "0", "--to", "900000", "-o", file, "--server", address_},
-        path("recorder.txt"));
+    const std::string id = "killed-" + std::to_string(round);
+    const std::string file = path(id + ".weft");
+    const v1::Session session = service_.create(small_scene(), id);
+    Process recorder("weft", {"record", id, "--to", "900000", "-o", file, "--server", address_},
+                     path("recorder.txt"));
     await_frame(file, 0);
-    service_.run(session_, killed_after + 100'000);
+    service_.run(session, killed_after + 20'000);  // as many as its history keeps
     await_frame(file, killed_after);
     recorder.signal(SIGKILL);
     EXPECT_EQ(recorder.wait(), 128 + SIGKILL);
-    service_.pause(session_);
+    service_.pause(session);
 
     const auto frames = recorded(file);
     ASSERT_GT(frames.size(), static_cast<std::size_t>(killed_after));
     EXPECT_EQ(ask({"info", file})["faults"], 0);
-    expect_equal(frames, stream("sessions/cloth", 0, static_cast<std::int64_t>(frames.size()) - 1));
+    expect_equal(frames, stream(session.name(), 0, static_cast<std::int64_t>(frames.size()) - 1));
   }
 }
 

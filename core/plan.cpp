@@ -5,21 +5,13 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <sstream>
 
+#include "core/model/text.h"
 #include "core/motion/sheet_solver.h"
 #include "core/motion/stability.h"
 
 namespace weft {
 namespace {
-
-template <class... Parts>
-std::string join(const Parts&... parts) {
-  std::ostringstream out;
-  out.precision(4);
-  (out << ... << parts);
-  return out.str();
-}
 
 std::string sheet_path(std::size_t index) { return "sheets[" + std::to_string(index) + "]"; }
 

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 
 #include "core/forces/springs.h"
 #include "core/lab/elastica.h"
 #include "core/lab/equilibrium.h"
 #include "core/model/mesh.h"
+#include "core/model/text.h"
 
 namespace weft {
 namespace {
@@ -17,14 +17,6 @@ constexpr int kMostParticles = 6000;  // of a specimen: seconds of Newton's meth
 constexpr double kWidth = 0.025;      // of a strip, m: ASTM D1388
 constexpr const char* kChordAngle = "chord angle";
 constexpr const char* kChordAngleUnshortened = "chord angle, not shortened";
-
-template <class... Parts>
-std::string join(const Parts&... parts) {
-  std::ostringstream out;
-  out.precision(4);
-  (out << ... << parts);
-  return out.str();
-}
 
 // A specimen cut along the weft is one along the warp of the textile turned.
 MeasuredTextile along_warp(const LabOrder& order) {

@@ -2,20 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "core/forces/springs.h"
+#include "core/model/text.h"
 
 namespace weft {
 namespace {
-
-template <class... Parts>
-std::string join(const Parts&... parts) {
-  std::ostringstream out;
-  out.precision(4);
-  (out << ... << parts);
-  return out.str();
-}
 
 // False for NaN too.
 bool within_reach(const Matrix3Xd& values) {

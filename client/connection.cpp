@@ -1,6 +1,10 @@
 #include "client/connection.h"
 
 #include <fmt/format.h>
+#include <grpcpp/generic/generic_stub.h>
+
+#include <chrono>
+#include <string_view>
 
 #include "server/server.h"
 
@@ -51,6 +55,7 @@ Connection::Connection(std::unique_ptr<Embedded> server, std::string address,
                        const std::shared_ptr<grpc::Channel>& channel, std::stop_token stop)
     : embedded_(std::move(server)),
       address_(std::move(address)),
+      channel_(channel),
       stop_(std::move(stop)),
       stubs_(v1::SessionService::NewStub(channel), v1::FrameService::NewStub(channel),
              v1::TextileService::NewStub(channel), v1::ServerService::NewStub(channel)) {}
@@ -61,6 +66,29 @@ v1::Session Connection::get_session(const std::string& name) {
   v1::GetSessionRequest request;
   request.set_name(name);
   return call(&v1::SessionService::Stub::GetSession, request);
+}
+
+bool Connection::is_serving() {
+  grpc::GenericStub stub(channel_);
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(2));
+  const std::stop_callback cancel(stop_, [&] { context.TryCancel(); });
+  grpc::CompletionQueue queue;
+  const grpc::Slice whole_server;  // an empty HealthCheckRequest
+  const auto call = stub.PrepareUnaryCall(&context, "/grpc.health.v1.Health/Check",
+                                          grpc::ByteBuffer(&whole_server, 1), &queue);
+  call->StartCall();
+  grpc::ByteBuffer response;
+  grpc::Status status;
+  call->Finish(&response, &status, nullptr);
+  void* tag = nullptr;
+  bool ok = false;
+  queue.Next(&tag, &ok);
+  check(status);
+  grpc::Slice bytes;
+  response.DumpToSingleSlice(&bytes);
+  constexpr std::string_view kServing = "\x08\x01";  // HealthCheckResponse{status: SERVING}
+  return std::string_view(reinterpret_cast<const char*>(bytes.begin()), bytes.size()) == kServing;
 }
 
 void Connection::check(const grpc::Status& status) const {

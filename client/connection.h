@@ -43,6 +43,8 @@ class Connection {
   }
 
   v1::Session get_session(const std::string& name);  // "sessions/flag"
+  // Whether the server takes calls, as its gRPC health service says.
+  bool is_serving();
   v1::FrameService::Stub& frames() {
     return *std::get<std::unique_ptr<v1::FrameService::Stub>>(stubs_);
   }
@@ -58,6 +60,7 @@ class Connection {
 
   std::unique_ptr<Embedded> embedded_;
   std::string address_;
+  std::shared_ptr<grpc::Channel> channel_;
   std::stop_token stop_;
   std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,
              std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>>

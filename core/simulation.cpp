@@ -103,9 +103,9 @@ struct Simulation::State {
 
   State(Scene given, SolverFactory factory);
   void bind_forces();
-  void step(double time, double dt);
-  bool compute_frame();
-  Attempt attempt();
+  void step(double time, double dt, Crew& crew);
+  bool compute_frame(Crew& crew);
+  Attempt attempt(Crew& crew);
   bool quiet() const;
   void set_halvings(int count);
   Plan plan_for(const std::vector<Matrix3Xd>& x) const;
@@ -113,19 +113,19 @@ struct Simulation::State {
 };
 
 // One substep, from `time` to `time` + dt.
-void Simulation::State::step(double time, double dt) {
+void Simulation::State::step(double time, double dt, Crew& crew) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     Sheet& sheet = sheets[s];
     const SheetDefinition& definition = scene.sheets[s];
 
     // forces and motion
-    sheet.solver->advance(time);
+    sheet.solver->advance(time, crew);
     lead_pins(definition, time + dt, dt, sheet);
 
     // contact last, so that no particle ends a step inside a collider
     if (!scene.colliders.empty())
       sheet.solver->resolve(
-          Contacts(scene.colliders, definition.textile.friction, sheet.skin, time + dt, dt));
+          Contacts(scene.colliders, definition.textile.friction, sheet.skin, time + dt, dt), crew);
   }
 }
 
@@ -215,10 +215,10 @@ bool Simulation::State::quiet() const {
 }
 
 // Computes the next frame from the state that the solvers are in, and has it looked at.
-Attempt Simulation::State::attempt() {
+Attempt Simulation::State::attempt(Crew& crew) {
   const double begin = time();
   for (std::int64_t k = 0; k < plan.step.substeps; ++k)
-    step(begin + static_cast<double>(k) * plan.step.substep, plan.step.substep);
+    step(begin + static_cast<double>(k) * plan.step.substep, plan.step.substep, crew);
 
   Attempt made{{}, {}, halvings};
   for (std::size_t s = 0; s < sheets.size(); ++s) {
@@ -238,11 +238,11 @@ Attempt Simulation::State::attempt() {
 }
 
 // Attempts the next frame until it can be trusted; false: repairs are used up.
-bool Simulation::State::compute_frame() {
+bool Simulation::State::compute_frame(Crew& crew) {
   const std::size_t repairs_before = repairs.size();
   const int halvings_before = halvings;
   for (std::optional<Attempt> doubtful;;) {
-    Attempt made = attempt();
+    Attempt made = attempt(crew);
     if (made.reason.empty()) return true;
     if (doubtful && made.confirms(*doubtful)) {
       // the longer step was right: it goes on from here
@@ -307,21 +307,27 @@ std::optional<StepRefusal> Simulation::refusal() const {
   return refusal_of(state_->plan.step, state_->scene.solver.allow_unstable);
 }
 
-bool Simulation::advance_frame() {
+bool Simulation::advance_frame(Crew& crew) {
   assert(!refusal());
   State& state = *state_;
-  if (at_rest() && !state.scene.environment.wind) {
+  if (asleep()) {
     state.substeps = 0;
     ++state.frame;
     return true;
   }
 
-  if (!state.failure.empty() || !state.compute_frame()) return false;
+  if (!state.failure.empty() || !state.compute_frame(crew)) return false;
   state.substeps = state.plan.step.substeps;
   state.frames_at_rest = state.quiet() ? state.frames_at_rest + 1 : 0;
   for (Sheet& sheet : state.sheets) std::swap(sheet.good, sheet.next);
   ++state.frame;
   return true;
+}
+
+int Simulation::most_hands() const {
+  int most = 1;
+  for (const Sheet& sheet : state_->sheets) most = std::max(most, sheet.solver->most_hands());
+  return most;
 }
 
 const std::vector<Repair>& Simulation::repairs() const { return state_->repairs; }
@@ -333,6 +339,8 @@ bool Simulation::at_rest() const {
   constexpr int kFrames = 30;
   return state_->frames_at_rest >= kFrames;
 }
+
+bool Simulation::asleep() const { return at_rest() && !state_->scene.environment.wind; }
 
 int Simulation::particle_count() const {
   int count = 0;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/model/scene.h"
+#include "core/motion/crew.h"
 #include "core/plan.h"
 
 namespace weft {
@@ -62,8 +63,11 @@ class Simulation {
   // computed again from the one before it with half the step; where both attempts agree, the motion
   // is real and the step stays. After scene().solver.max_repairs repairs it returns false for good,
   // with the state of the last good frame. A scene at rest, without wind, sleeps: the frame repeats
-  // without a substep until a textile changes.
-  [[nodiscard]] bool advance_frame();
+  // without a substep until a textile changes. The crew shares large sheets; frames do not depend
+  // on it.
+  [[nodiscard]] bool advance_frame(Crew& crew = no_crew());
+  // More than these have nothing to do in a crew.
+  int most_hands() const;
   // All so far.
   const std::vector<Repair>& repairs() const;
   // Why advance_frame() returned false.
@@ -74,6 +78,7 @@ class Simulation {
   std::int64_t frame() const;
   double time() const;         // s
   bool at_rest() const;        // for 30 frames, see Session.at_rest in the interface
+  bool asleep() const;         // at rest, and nothing will wake it but a new textile
   int particle_count() const;  // of all sheets
 
   // Planes x, y, z of all sheets in scene order; out has 3 x particle_count values.

@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include "core/motion/lattice_law.h"
 #include "core/motion/sheet_solver.h"
@@ -42,7 +44,7 @@ class LatticeSolver : public SheetSolver {
     std::fill(gap_.begin(), gap_.end(), 0);
   }
 
-  void advance(double time) override {
+  void advance(double time, Crew& crew) override {
     Vector3d drift = dynamics_.gravity * (dt_ * dt_);
     if (dynamics_.drag.size() > 0) {
       const double rate = drag_rate();
@@ -51,7 +53,7 @@ class LatticeSolver : public SheetSolver {
     }
     for (std::size_t axis = 0; axis < 3; ++axis)
       law_.drift[axis] = static_cast<T>(drift[static_cast<Eigen::Index>(axis)]);
-    moved_ = sweep(law_, state_);
+    moved_ = sweep(law_, state_, bands(crew), crew);
   }
 
   void lead(int particle, const Vector3d& x, const Vector3d& d) override {
@@ -63,16 +65,29 @@ class LatticeSolver : public SheetSolver {
   }
 
   // A row is looked at again when it, or a collider, may have come as far as its gap was wide.
-  void resolve(const Contacts& contacts) override {
+  void resolve(const Contacts& contacts, Crew& crew) override {
     law_.measured = true;
     constexpr double kRounding = 1.001;
     const double approach = kRounding * (moved_ + contacts.reach());
-    for (int r = 0; r < law_.layout.rows; ++r) {
-      double& gap = gap_[static_cast<std::size_t>(r)];
-      gap -= approach;
-      if (gap > 0) continue;
-      gap = resolve_row(contacts, r);
-    }
+    near_.clear();
+    for (int r = 0; r < law_.layout.rows; ++r)
+      if ((gap_[static_cast<std::size_t>(r)] -= approach) <= 0) near_.push_back(r);
+    const int count = static_cast<int>(near_.size());
+    const auto resolve_part = [&](int part, int parts) {
+      for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
+        const int r = near_[static_cast<std::size_t>(i)];
+        gap_[static_cast<std::size_t>(r)] = resolve_row(contacts, r);
+      }
+    };
+    const int parts = std::min(bands(crew), count);
+    if (parts <= 1) return resolve_part(0, 1);
+    crew.run(parts, [&](int part) { resolve_part(part, parts); });
+  }
+
+  // Smaller bands cost more to share than they take.
+  int most_hands() const override {
+    constexpr int kParticles = 4096, kRows = 16;
+    return std::max(1, std::min(particles_ / kParticles, law_.layout.rows / kRows));
   }
 
   void positions(Matrix3Xd& x) const override {
@@ -98,6 +113,8 @@ class LatticeSolver : public SheetSolver {
 
  private:
   using State = SweepState<T>;
+
+  int bands(const Crew& crew) const { return std::min(crew.hands(), most_hands()); }
 
   struct Place {
     int row, column;
@@ -168,6 +185,7 @@ class LatticeSolver : public SheetSolver {
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
   double moved_ = 0;                    // farthest displacement of the last step, m
   std::vector<double> gap_;             // of each row to the nearest skin, at most, m
+  std::vector<int> near_;               // rows that may touch, in this step
 };
 
 }  // namespace

@@ -30,7 +30,7 @@ inline constexpr Connection kConnections[] = {{1, 1, 1, kRight1, false}, {0, 1, 
 template <std::size_t... k>
 using Connections = std::index_sequence<k...>;
 
-// A sweep from the row above the first one down.
+// A sweep over a band, from the rows above it down.
 template <class T, BendKind kBend, bool kShears, bool kBendsDiagonal>
 class Sweep {
   using D = hn::ScalableTag<T>;
@@ -40,9 +40,10 @@ class Sweep {
 
  public:
   // work: work_size() values
-  Sweep(const SweepLaw<T>& law, SweepState<T>& state, T* work)
+  Sweep(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band, T* work)
       : law_(law),
         state_(state),
+        band_(band),
         vectors_(law.layout.vectors()),
         forces_(work + (kHalo + 1) * kForces),
         heard_(work + forces_size(law.layout)),
@@ -59,12 +60,14 @@ class Sweep {
   }
 
   T run() {
-    const int rows = law_.layout.rows;
     std::fill_n(forces_ - kHalo * kForces, 3 * (vectors_ + 2 * kHalo) * kForces, T(0));
     std::fill_n(heard_, vectors_ * kHeard, T(0));
-    prepare(0);
-    if (law_.damping > 0) damp_first();
-    for (int r = -1; r < rows; ++r) {
+    const int first = std::max(band_.first - 2, -1);
+    for (int r = std::max(first, 0); r < first + 2; ++r) {
+      prepare(r);
+      if (law_.damping > 0) listen(r);
+    }
+    for (int r = first; r < band_.last; ++r) {
       prepare(r + 2);
       sweep_row(r);
       fold(r + 1);
@@ -88,7 +91,7 @@ class Sweep {
 
   // What the vectors of a row share.
   struct Row {
-    bool moves, after;  // r exists; r + 2 does
+    bool moves, after;  // r is of the band; r + 2 exists
     StretchLaw<T> along, down, diagonal;
     const BendLaw<T>*bend_along, *bend_down, *bend_diagonal;
     T isometric_along, isometric_down, isometric_twist;
@@ -138,7 +141,7 @@ class Sweep {
   void prepare(int r) const {
     const D d;
     if (r >= law_.layout.rows) return;
-    T* const row = state_.seen(r);
+    T* const row = state_.seen(band_, r);
     const auto copy = [&](const T* from, T* to, const T* mask) HWY_ATTR {
       for (int plane = 0; plane < State::kSeen; ++plane)
         for (int part = 0; part < kLanes; part += kPart) {
@@ -175,31 +178,32 @@ class Sweep {
 
   Row describe(int r) const {
     const int rows = law_.layout.rows;
-    const bool moves = r >= 0, next = r + 1 < rows, after = r + 2 < rows;
+    const bool here = r >= 0, next = r + 1 < rows, after = r + 2 < rows;
     const bool edge = r + 1 == 0 || r + 1 == rows - 1;
     Row row{};
-    row.moves = moves;
+    row.moves = r >= band_.first;
     row.after = after;
     if (next) row.along = edge ? law_.warp_edge : law_.warp;
-    if (moves && next) row.down = law_.weft, row.diagonal = law_.shear;
+    if (here && next) row.down = law_.weft, row.diagonal = law_.shear;
     row.bend_along = !next ? &law_.none : edge ? &law_.along_warp_edge : &law_.along_warp;
-    row.bend_down = moves && after ? &law_.along_weft : &law_.none;
-    row.bend_diagonal = moves && after && law_.bend_diagonal ? &law_.diagonal : &law_.none;
+    row.bend_down = here && after ? &law_.along_weft : &law_.none;
+    row.bend_diagonal = here && after && law_.bend_diagonal ? &law_.diagonal : &law_.none;
     if (next) row.isometric_along = edge ? law_.isometric_warp_edge : law_.isometric_warp;
-    if (moves && after) row.isometric_down = law_.isometric_weft;
+    if (here && after) row.isometric_down = law_.isometric_weft;
     if (after) row.isometric_twist = law_.isometric_twist;
     row.near_rows = static_cast<T>((r + 1 >= 0) + 1 + (r + 3 < rows));
-    row.far_rows = static_cast<T>(moves + 1 + (r + 4 < rows));
+    row.far_rows = static_cast<T>(here + 1 + (r + 4 < rows));
     return row;
   }
 
   void sweep_row(int r) {
     const int last = law_.layout.rows - 1;
     const Row row = describe(r);
-    T *seen = state_.seen(std::max(r, 0)), *seen1 = state_.seen(std::min(r + 1, last));
-    T* seen2 = state_.seen(std::min(r + 2, last));
+    T* seen = state_.seen(band_, std::max(r, 0));
+    T* seen1 = state_.seen(band_, std::min(r + 1, last));
+    T* seen2 = state_.seen(band_, std::min(r + 2, last));
     T *force = forces(r), *force1 = forces(r + 1), *force2 = forces(r + 2), *heard = heard_;
-    T* own = state_.own(std::max(r, 0));
+    T* own = state_.own(std::max(r, band_.first));
     const T* columns = law_.columns.data();
     for (int j = 0; j < vectors_; ++j) {
 #pragma GCC unroll 1
@@ -217,13 +221,13 @@ class Sweep {
     }
   }
 
-  // Lets row 0 be heard, as row r + 2 is while row r is swept.
-  void damp_first() {
-    const Row row = describe(-2);
+  // Lets row r be heard, as row r + 2 is while row r is swept.
+  void listen(int r) {
+    const Row row = describe(r - 2);
     for (int j = 0; j < vectors_; ++j)
       for (int part = 0; part < kLanes; part += kPart) {
-        T* const seen = state_.seen(0) + j * kSeen + part;
-        T* const force = forces(0) + j * kForces + part;
+        T* const seen = state_.seen(band_, r) + j * kSeen + part;
+        T* const force = forces(r) + j * kForces + part;
         const Place p{seen,
                       seen,
                       seen,
@@ -427,6 +431,7 @@ class Sweep {
 
   const SweepLaw<T>& law_;
   SweepState<T>& state_;
+  SweepBand<T>& band_;
   const int vectors_;
   T *const forces_, *const heard_;
   std::array<Halo, 2 * kHalo> halo_;
@@ -434,45 +439,46 @@ class Sweep {
 };
 
 template <BendKind kBend, bool kShears, bool kBendsDiagonal, class T>
-T sweep_as(const SweepLaw<T>& law, SweepState<T>& state) {
+T sweep_as(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band) {
   using Sweeper = Sweep<T, kBend, kShears, kBendsDiagonal>;
   static thread_local AlignedArray<T> work;
   const std::size_t size = Sweeper::work_size(law.layout);
   if (work.size() < size) work = AlignedArray<T>(size);
-  return Sweeper(law, state, work.data()).run();
+  return Sweeper(law, state, band, work.data()).run();
 }
 
 // Features are left out of the code where that is measured to pay: all of the default law's, and
 // shear elsewhere.
 template <class T>
-T sweep_lattice(const SweepLaw<T>& law, SweepState<T>& state) {
+T sweep_lattice(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band) {
   const bool shears = law.shear.stiffness > 0;
   switch (law.bend) {
     case BendKind::kNone:
-      return shears ? sweep_as<BendKind::kNone, true, false>(law, state)
-                    : sweep_as<BendKind::kNone, false, false>(law, state);
+      return shears ? sweep_as<BendKind::kNone, true, false>(law, state, band)
+                    : sweep_as<BendKind::kNone, false, false>(law, state, band);
     case BendKind::kTable32:
       if (law.bend_diagonal)
-        return shears ? sweep_as<BendKind::kTable32, true, true>(law, state)
-                      : sweep_as<BendKind::kTable32, false, true>(law, state);
-      return shears ? sweep_as<BendKind::kTable32, true, false>(law, state)
-                    : sweep_as<BendKind::kTable32, false, false>(law, state);
+        return shears ? sweep_as<BendKind::kTable32, true, true>(law, state, band)
+                      : sweep_as<BendKind::kTable32, false, true>(law, state, band);
+      return shears ? sweep_as<BendKind::kTable32, true, false>(law, state, band)
+                    : sweep_as<BendKind::kTable32, false, false>(law, state, band);
     case BendKind::kTable:
-      return sweep_as<BendKind::kTable, true, true>(law, state);
+      return sweep_as<BendKind::kTable, true, true>(law, state, band);
     case BendKind::kPolynomial:
-      return sweep_as<BendKind::kPolynomial, true, true>(law, state);
+      return sweep_as<BendKind::kPolynomial, true, true>(law, state, band);
     case BendKind::kIsometric:
       break;
   }
-  return shears ? sweep_as<BendKind::kIsometric, true, false>(law, state)
-                : sweep_as<BendKind::kIsometric, false, false>(law, state);
+  return shears ? sweep_as<BendKind::kIsometric, true, false>(law, state, band)
+                : sweep_as<BendKind::kIsometric, false, false>(law, state, band);
 }
 
-float sweep_single(const SweepLaw<float>& law, SweepState<float>& state) {
-  return sweep_lattice(law, state);
+float sweep_single(const SweepLaw<float>& law, SweepState<float>& state, SweepBand<float>& band) {
+  return sweep_lattice(law, state, band);
 }
-double sweep_double(const SweepLaw<double>& law, SweepState<double>& state) {
-  return sweep_lattice(law, state);
+double sweep_double(const SweepLaw<double>& law, SweepState<double>& state,
+                    SweepBand<double>& band) {
+  return sweep_lattice(law, state, band);
 }
 
 }  // namespace weft::HWY_NAMESPACE
@@ -484,12 +490,32 @@ namespace weft {
 HWY_EXPORT(sweep_single);
 HWY_EXPORT(sweep_double);
 
-float sweep(const SweepLaw<float>& law, SweepState<float>& state) {
-  return HWY_DYNAMIC_DISPATCH(sweep_single)(law, state);
+namespace {
+
+float sweep_band(const SweepLaw<float>& law, SweepState<float>& state, SweepBand<float>& band) {
+  return HWY_DYNAMIC_DISPATCH(sweep_single)(law, state, band);
 }
-double sweep(const SweepLaw<double>& law, SweepState<double>& state) {
-  return HWY_DYNAMIC_DISPATCH(sweep_double)(law, state);
+double sweep_band(const SweepLaw<double>& law, SweepState<double>& state, SweepBand<double>& band) {
+  return HWY_DYNAMIC_DISPATCH(sweep_double)(law, state, band);
 }
+
+}  // namespace
+
+template <class T>
+T sweep(const SweepLaw<T>& law, SweepState<T>& state, int count, Crew& crew) {
+  std::vector<SweepBand<T>>& bands = state.divide(count);
+  if (count == 1) return sweep_band(law, state, bands.front());
+  crew.run(count, [&](int i) {
+    SweepBand<T>& band = bands[static_cast<std::size_t>(i)];
+    band.farthest = sweep_band(law, state, band);
+  });
+  T farthest = 0;
+  for (const SweepBand<T>& band : bands) farthest = std::max(farthest, band.farthest);
+  return farthest;
+}
+
+template float sweep(const SweepLaw<float>&, SweepState<float>&, int, Crew&);
+template double sweep(const SweepLaw<double>&, SweepState<double>&, int, Crew&);
 
 bool sweeps_with_fma() { return (hwy::SupportedTargets() & (HWY_AVX2 | HWY_AVX3 | HWY_NEON)) != 0; }
 
@@ -516,6 +542,28 @@ SweepState<T>::SweepState(const LatticeLayout<T>& layout, bool compensated)
     const std::ptrdiff_t vector = layout.vector(c), lane = layout.lane(c);
     columns_.push_back({vector * kSeenStride + lane, vector * own_stride() - kSeenStride + lane});
   }
+}
+
+template <class T>
+std::vector<SweepBand<T>>& SweepState<T>::divide(int bands) {
+  bands_.resize(static_cast<std::size_t>(bands));
+  const int rows = layout_.rows;
+  const auto copy = [&](int row, AlignedArray<T>& to) {
+    if (to.size() == 0) to = AlignedArray<T>(static_cast<std::size_t>(2 * (seen_row() + kMargin)));
+    for (int k = 0; k < 2; ++k) {
+      if (row + k < 0 || row + k >= rows) continue;
+      std::copy_n(seen(row + k), layout_.vectors() * kSeenStride,
+                  to.data() + kMargin + k * seen_row());
+    }
+  };
+  for (int b = 0; b < bands; ++b) {
+    SweepBand<T>& band = bands_[static_cast<std::size_t>(b)];
+    band.first = rows * b / bands;
+    band.last = rows * (b + 1) / bands;
+    if (b > 0) copy(band.first - 2, band.before);
+    if (b + 1 < bands) copy(band.last, band.after);
+  }
+  return bands_;
 }
 
 template class AlignedArray<float>;

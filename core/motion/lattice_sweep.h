@@ -5,6 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "core/motion/crew.h"
+
 namespace weft {
 
 // Zeroed values on a vector boundary.
@@ -112,6 +114,15 @@ struct SweepLaw {
   AlignedArray<T> halo_exists, halo_folds;  // (2 kHalo x lanes)
 };
 
+// Rows first ... last - 1, which are swept on their own: with copies of what was seen, before the
+// sweep, of the two rows before and the two after them.
+template <class T>
+struct SweepBand {
+  int first = 0, last = 0;
+  AlignedArray<T> before, after;
+  T farthest = 0;  // largest displacement, m
+};
+
 // A lattice sheet in motion. Of every vector, its planes one after the other: those that neighbours
 // see, with a halo, and those of its own.
 template <class T>
@@ -147,6 +158,15 @@ class SweepState {
     return const_cast<SweepState*>(this)->at(plane, r, c);
   }
 
+  // Divides the sheet as it is now into so many bands, which may be swept at the same time.
+  std::vector<SweepBand<T>>& divide(int bands);
+  // What a band sees of row r, first - 2 <= r < last + 2.
+  T* seen(SweepBand<T>& band, int r) {
+    if (r < band.first) return band.before.data() + kMargin + (r - band.first + 2) * seen_row();
+    if (r >= band.last) return band.after.data() + kMargin + (r - band.last) * seen_row();
+    return seen(r);
+  }
+
  private:
   static constexpr std::ptrdiff_t kMargin = (LatticeLayout<T>::kHalo + 1) * kSeenStride;
   std::ptrdiff_t seen_row() const {
@@ -161,13 +181,14 @@ class SweepState {
   int planes_;
   std::vector<Column> columns_;
   AlignedArray<T> seen_, own_;
+  std::vector<SweepBand<T>> bands_;
 };
 
 // One substep of eq. 2 to 8 over the whole lattice, in one sweep over its rows: every connection
-// once, forces and motion while they are in cache. Equal bits on every processor with FMA.
-// Returns the largest displacement where law.measured, m.
-float sweep(const SweepLaw<float>& law, SweepState<float>& state);
-double sweep(const SweepLaw<double>& law, SweepState<double>& state);
+// once, forces and motion while they are in cache. Equal bits on every processor with FMA, and for
+// every number of bands. Returns the largest displacement where law.measured, m.
+template <class T>
+T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, Crew& crew);
 
 // Whether this processor has FMA; without it sweeps have other bits.
 bool sweeps_with_fma();

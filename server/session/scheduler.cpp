@@ -17,6 +17,7 @@ void Scheduler::wake(const std::shared_ptr<Task>& task) {
   switch (task->phase_) {
     case Task::Phase::kWaiting:
       std::erase_if(waiting_, [&](const auto& entry) { return entry.second == task; });
+      note_due();
       [[fallthrough]];
     case Task::Phase::kIdle:
       queue(task);
@@ -34,9 +35,29 @@ bool Scheduler::post(std::function<void()> work) {
   std::lock_guard lock(mutex_);
   if (stopping_ || posted_ >= kMaxPosted) return false;
   ++posted_;
-  ready_.push_back({nullptr, std::move(work)});
-  changed_.notify_one();
+  push({nullptr, std::move(work)});
   return true;
+}
+
+bool Scheduler::help(std::function<void()> work) {
+  std::lock_guard lock(mutex_);
+  if (stopping_ || idle_ <= ready_.size()) return false;
+  ++posted_;
+  push({nullptr, std::move(work)});
+  return true;
+}
+
+void Scheduler::push(Job job) {
+  ready_.push_back(std::move(job));
+  busy_ = true;
+  changed_.notify_one();
+}
+
+Scheduler::Job Scheduler::pop() {
+  Job job = std::move(ready_.front());
+  ready_.pop_front();
+  busy_ = !ready_.empty();
+  return job;
 }
 
 void Scheduler::stop() {
@@ -56,22 +77,22 @@ void Scheduler::work() {
   while (!stopping_) {
     queue_due();
     if (!ready_.empty()) {
-      Job job = std::move(ready_.front());
-      ready_.pop_front();
-      run(lock, std::move(job));
-    } else if (waiting_.empty()) {
-      changed_.wait(lock);
-    } else {
-      changed_.wait_until(lock, Clock::time_point(waiting_.begin()->first));
+      run(lock, pop());
+      continue;
     }
+    ++idle_;
+    if (waiting_.empty())
+      changed_.wait(lock);
+    else
+      changed_.wait_until(lock, Clock::time_point(waiting_.begin()->first));
+    --idle_;
   }
 }
 
 // Precondition: the task is in no queue.
 void Scheduler::queue(std::shared_ptr<Task> task) {
   task->phase_ = Task::Phase::kQueued;
-  ready_.push_back({std::move(task), nullptr});
-  changed_.notify_one();
+  push({std::move(task), nullptr});
 }
 
 void Scheduler::queue_due() {
@@ -80,6 +101,11 @@ void Scheduler::queue_due() {
     auto entry = waiting_.extract(waiting_.begin());
     queue(std::move(entry.mapped()));
   }
+  note_due();
+}
+
+void Scheduler::note_due() {
+  next_due_ = waiting_.empty() ? kNever : waiting_.begin()->first.time_since_epoch().count();
 }
 
 void Scheduler::run(std::unique_lock<std::mutex>& lock, Job job) {
@@ -101,6 +127,7 @@ void Scheduler::run(std::unique_lock<std::mutex>& lock, Job job) {
   } else if (due) {
     job.task->phase_ = Task::Phase::kWaiting;
     waiting_.emplace(*due, std::move(job.task));
+    note_due();
     changed_.notify_one();  // the next due time may be an earlier one now
   } else {
     job.task->phase_ = Task::Phase::kIdle;

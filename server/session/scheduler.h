@@ -1,10 +1,12 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -45,16 +47,27 @@ class Scheduler {
   // Runs `work` once, in its turn. False, and nothing done, when kMaxPosted already wait.
   [[nodiscard]] bool post(std::function<void()> work);
 
+  // Runs `work` at once on a thread that has nothing else to do. False, and nothing done, where
+  // there is none. It ends soon once busy().
+  [[nodiscard]] bool help(std::function<void()> work);
+
+  // Whether something waits for a thread.
+  bool busy() const { return busy_ || Clock::now().time_since_epoch().count() >= next_due_; }
+
   // Lets each thread finish its slice, and drops the rest.
   void stop();
 
  private:
+  static constexpr Clock::rep kNever = std::numeric_limits<Clock::rep>::max();
   struct Job {  // one of the two
     std::shared_ptr<Task> task;
     std::function<void()> work;
   };
 
   void work();
+  void push(Job job);
+  Job pop();
+  void note_due();
   void queue(std::shared_ptr<Task> task);
   void queue_due();
   void run(std::unique_lock<std::mutex>& lock, Job job);
@@ -62,8 +75,11 @@ class Scheduler {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Job> ready_;
+  std::atomic<bool> busy_ = false;                                   // ready_ is not empty
+  std::size_t idle_ = 0;                                             // threads that wait
   std::size_t posted_ = 0;                                           // jobs in ready_ with work
   std::multimap<Clock::time_point, std::shared_ptr<Task>> waiting_;  // by due time
+  std::atomic<Clock::rep> next_due_ = kNever;                        // of waiting_
   bool stopping_ = false;
   std::vector<std::jthread> threads_;
 };

@@ -9,6 +9,8 @@
 #include <random>
 #include <sstream>
 
+#include "server/session/frame_crew.h"
+
 namespace weft {
 namespace {
 
@@ -525,7 +527,7 @@ void Session::end_step() {
 }
 
 void Session::compute_frame() {
-  const bool good = simulation_.advance_frame();
+  const bool good = advance_frame();
   auto repairs = take_repairs();
   if (!good) return fail("the solver diverged: " + simulation_.failure());
   const auto frame = make_frame(std::move(repairs));
@@ -539,6 +541,13 @@ void Session::compute_frame() {
     }
   }
   offer_to_all();
+}
+
+bool Session::advance_frame() {
+  const int most_hands = simulation_.most_hands();
+  if (most_hands == 1) return simulation_.advance_frame();
+  FrameCrew crew(scheduler_, most_hands);
+  return simulation_.advance_frame(crew);
 }
 
 // Those that the last frame took, which are published with it.
@@ -571,6 +580,11 @@ std::optional<Clock::time_point> Session::next_due() {
     return past_holders_ ? std::optional(past_holders_->until) : std::nullopt;
   }
   if (restoring_) return Clock::time_point::min();
+  if (nobody_waits()) {
+    held_ = true;
+    return std::nullopt;
+  }
+  release();
   if (latest() >= reach_.frame || !reach_suffices()) return std::nullopt;  // being written
   if (steps_begun() || !run_->time_scale) return Clock::time_point::min();
   const double frames = static_cast<double>(latest() + 1 - run_->start_frame);
@@ -594,6 +608,11 @@ std::shared_ptr<const Frame> Session::make_frame(std::vector<Repair> repairs) co
   frame->substep = simulation_.plan().step.substep;
   frame->repairs = std::move(repairs);
   return frame;
+}
+
+// Whether the frames to come are all like the last one, without a goal and with nobody to see them.
+bool Session::nobody_waits() const {
+  return simulation_.asleep() && subscriptions_.empty() && !steps_begun() && !run_->until_frame;
 }
 
 // While it is restored it shows nothing else, but a failure.

@@ -150,9 +150,11 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Outcome pause();
   Outcome apply(const TextileSet& change);
   void compute_frame();
+  bool advance_frame();
   std::vector<Repair> take_repairs();
   void fail(const std::string& why);
   std::optional<Clock::time_point> next_due();
+  bool nobody_waits() const;
   std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs) const;
 
   // with the mutex held
@@ -199,7 +201,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::vector<Repair> repairs_;
   History history_;
   std::vector<Subscription*> subscriptions_;
-  bool held_ = false;  // idle until a subscriber reads on
+  bool held_ = false;  // idle until a subscriber comes, or reads on
   Writing writing_;
   Reach reach_;                   // as it was written last
   std::int64_t ahead_ = 16;       // frames that the reach is put ahead

@@ -31,12 +31,11 @@ std::unique_ptr<Subscription> Session::subscribe(std::weak_ptr<FrameSink> sink,
   auto subscription = std::make_unique<Subscription>(shared_from_this(), std::move(sink),
                                                      start.value_or(latest()), policy);
   subscriptions_.push_back(subscription.get());
-  if (policy == SlowReader::kHoldSession && past_holders_ && --past_holders_->count == 0) {
+  if (policy == SlowReader::kHoldSession && past_holders_ && --past_holders_->count == 0)
     past_holders_.reset();
-    const bool released = release();
-    lock.unlock();
-    if (released) wake();
-  }
+  const bool released = release();
+  lock.unlock();
+  if (released) wake();
   return subscription;
 }
 
@@ -71,7 +70,7 @@ Reading Session::read(Subscription& subscription) {
   return reading;
 }
 
-// Ends the wait for subscribers. The pace begins anew: time lost is not made up for in a rush.
+// Ends the wait. The pace begins anew: time lost is not made up for in a rush.
 bool Session::release() {
   if (!held_) return false;
   held_ = false;

@@ -2,8 +2,10 @@
 #include <hwy/targets.h>
 
 #include <cstdlib>
+#include <optional>
 #include <string>
 
+#include "server/session/frame_crew.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft {
@@ -14,6 +16,7 @@ struct Case {
   Precision precision = Precision::kSingle;
   std::int64_t target = 0;  // of Highway; 0: the plain solver
   bool bare = false;        // neither damping nor compensation
+  int threads = 1;
   ChoiKo law{};
 };
 
@@ -35,10 +38,15 @@ void advance(benchmark::State& state, const Case& given) {
   scene.environment.gravity = {0, -9.8, 0};
   scene.solver.frame_step = 16 * Simulation(scene).plan().step.substep;
   Simulation simulation(scene);
-  for (int frame = 0; frame < 20; ++frame)
-    if (!simulation.advance_frame()) std::abort();
+  Scheduler scheduler(given.threads - 1);
+  std::optional<FrameCrew> crew;
+  do {
+    crew.emplace(scheduler, given.threads);
+    for (int frame = 0; frame < 20; ++frame)
+      if (!simulation.advance_frame(*crew)) std::abort();
+  } while (crew->hands() < given.threads);
   for (auto _ : state)
-    if (!simulation.advance_frame()) state.SkipWithError("diverged");
+    if (!simulation.advance_frame(*crew)) state.SkipWithError("diverged");
   state.SetItemsProcessed(state.iterations() * simulation.plan().step.substeps *
                           simulation.particle_count());
   hwy::SetSupportedTargetsForTest(0);
@@ -59,6 +67,7 @@ const bool added = [] {
       add("substep/" + size + "/double" + end, {rows, Precision::kDouble, target});
       add("substep_bare/" + size + "/float" + end, {rows, Precision::kSingle, target, true});
     }
+    add("substep/" + size + "/float/AVX-512/2", {.rows = rows, .target = HWY_AVX3, .threads = 2});
   }
   for (const int rows : {31, 101}) {
     const std::string size = std::to_string(rows) + "x" + std::to_string(rows);

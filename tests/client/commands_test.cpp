@@ -114,6 +114,13 @@ TEST_F(CommandsTest, EveryKindOfFailureHasItsExitCode) {
   EXPECT_THAT(lost.err, AllOf(HasSubstr(address_), HasSubstr("--server")));
 }
 
+TEST_F(CommandsTest, HealthSaysWhetherTheServerTakesCalls) {
+  EXPECT_EQ(weft({"health"}).out, "SERVING\n");
+  EXPECT_EQ(ask({"health"})["status"], "SERVING");
+  service_.server.stop();
+  EXPECT_EQ(weft({"health"}).exit, 3);
+}
+
 TEST_F(CommandsTest, HelpIsAnAnswer) {
   const Outcome help = weft({"--help"});
   EXPECT_EQ(help.exit, 0);

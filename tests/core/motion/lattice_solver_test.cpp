@@ -145,19 +145,29 @@ void fill_with_nan(SweepState<T>& state, const LatticeLayout<T>& layout) {
         state.at(plane, r, c) = std::numeric_limits<T>::quiet_NaN();
 }
 
+// Three hands that begin at the end.
+class BackwardCrew : public Crew {
+ public:
+  int hands() const override { return 3; }
+  void run(int parts, const std::function<void(int)>& part) override {
+    for (int i = parts - 1; i >= 0; --i) part(i);
+  }
+};
+
 // Every value of the lattice after some sweeps from fixed positions.
 template <class T>
-std::vector<T> swept(const SheetDefinition& sheet, bool poisoned) {
+std::vector<T> swept(const SheetDefinition& sheet, bool poisoned, int bands = 1) {
   using State = SweepState<T>;
   SweepLaw<T> law = make_sweep_law<T>(sheet);
   law.damping = static_cast<T>(sheet.textile.damping / (2 * 1e-4));
   law.drift = {0, T(-1e-7), 0};
   State state(law.layout, law.compensated);
+  BackwardCrew crew;
   if (poisoned) fill_with_nan(state, law.layout);
   const Matrix3Xd x = start_positions(sheet) + 0.01 * noise(sheet.particle_count());
   std::vector<T> out;
   for (int step = -1; step < 3; ++step) {
-    if (step >= 0) sweep(law, state);
+    if (step >= 0) sweep(law, state, bands, crew);
     for (int i = 0; i < sheet.particle_count(); ++i) {
       const int r = i / sheet.grid.columns, c = i % sheet.grid.columns;
       for (int axis = 0; axis < 3 && step < 0; ++axis)
@@ -176,6 +186,17 @@ TEST_P(Kernels, HearNothingOfTheirPadding) {
     GetParam().set(sheet);
     EXPECT_EQ(swept<float>(sheet, true), swept<float>(sheet, false)) << columns;
     EXPECT_EQ(swept<double>(sheet, true), swept<double>(sheet, false)) << columns;
+  }
+}
+
+TEST_P(Kernels, GiveTheSameBitsInAnyNumberOfBands) {
+  SheetDefinition sheet = flat_sheet(11, 37);
+  GetParam().set(sheet);
+  const auto single = swept<float>(sheet, false);
+  const auto twofold = swept<double>(sheet, false);
+  for (const int bands : {2, 3, 7, 11}) {
+    EXPECT_EQ(swept<float>(sheet, false, bands), single) << bands;
+    EXPECT_EQ(swept<double>(sheet, false, bands), twofold) << bands;
   }
 }
 
@@ -214,6 +235,20 @@ TEST(Repeatability, RunsHaveTheSameBitsOnEveryProcessorWithFma) {
         << hwy::TargetName(target);
   }
   if (targets == 0) GTEST_SKIP() << "this processor has no FMA";
+}
+
+TEST(Repeatability, RunsHaveTheSameBitsHoweverManyHandsShareThem) {
+  Scene scene = crumpled(flat_sheet(96, 130));
+  scene.colliders = {{"ball", Sphere{Vector3d(0.4, -0.2, 0.4), 0.2}, 0.3, {}}};
+  Simulation alone(scene), shared(scene);
+  EXPECT_EQ(shared.most_hands(), 3);
+  BackwardCrew crew;
+  for (int frame = 0; frame < 20; ++frame) {
+    ASSERT_TRUE(alone.advance_frame());
+    ASSERT_TRUE(shared.advance_frame(crew));
+  }
+  EXPECT_EQ(positions(shared), positions(alone));
+  EXPECT_EQ(velocities(shared), velocities(alone));
 }
 
 // Where the plain path looks at every particle in every step, the fast one looks when it must.

@@ -53,6 +53,51 @@ TEST(Session, CarriesOutStepsOneAfterTheOther) {
   EXPECT_EQ(session->status().newest->number, 57);
 }
 
+// At rest, running without a goal.
+std::shared_ptr<Session> sleeping_session(Scheduler& scheduler) {
+  const auto session = make_session(scheduler);
+  const auto watcher = Watcher::of(*session, {});
+  run(*session).applied();
+  while (!session->status().newest->at_rest) watcher->read();
+  return session;
+}
+
+// Whether it makes no frame while another session makes 50.
+bool is_idle(Scheduler& scheduler, const Session& session) {
+  const std::int64_t frame = session.status().newest->number;
+  step(*make_session(scheduler), 50).applied();
+  return session.status().newest->number == frame;
+}
+
+TEST(Session, AsleepWithoutGoalAndStreamTakesNoTurn) {
+  Scheduler scheduler(1);
+  const auto session = sleeping_session(scheduler);
+  while (!is_idle(scheduler, *session)) {
+  }
+  EXPECT_TRUE(is_idle(scheduler, *session));
+  EXPECT_EQ(session->status().state, SessionState::kRunning);
+}
+
+TEST(Session, AsleepGoesOnWithItsFirstStream) {
+  Scheduler scheduler(1);
+  const auto session = sleeping_session(scheduler);
+  while (!is_idle(scheduler, *session)) {
+  }
+  const std::int64_t next = session->status().newest->number + 1;
+  const auto watcher = Watcher::of(*session, next);
+  EXPECT_EQ(watcher->read().frame->number, next);
+}
+
+TEST(Session, AsleepGoesOnWithAnotherTextile) {
+  Scheduler scheduler(1);
+  const auto session = sleeping_session(scheduler);
+  while (!is_idle(scheduler, *session)) {
+  }
+  const std::int64_t applied = set_bend(*session, 1e-4).applied().frame;
+  while (session->status().newest->number < applied) std::this_thread::yield();
+  EXPECT_GT(session->status().newest->substeps, 0);
+}
+
 TEST(Session, ComputesTheFramesThatTheSolverAloneComputes) {
   Scheduler scheduler(2);
   const auto session = make_session(scheduler);

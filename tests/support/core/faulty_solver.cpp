@@ -18,8 +18,8 @@ class FaultySolver : public SheetSolver {
     struck_ = false;
     solver_->start(x, v, time, dt);
   }
-  void advance(double time) override {
-    solver_->advance(time);
+  void advance(double time, Crew& crew) override {
+    solver_->advance(time, crew);
     if (time < from_ || *times_ == 0 || std::exchange(struck_, true)) return;
     --*times_;
     Matrix3Xd x;
@@ -31,7 +31,7 @@ class FaultySolver : public SheetSolver {
   void lead(int particle, const Vector3d& x, const Vector3d& d) override {
     solver_->lead(particle, x, d);
   }
-  void resolve(const Contacts& contacts) override { solver_->resolve(contacts); }
+  void resolve(const Contacts& contacts, Crew& crew) override { solver_->resolve(contacts, crew); }
   void positions(Matrix3Xd& x) const override { solver_->positions(x); }
   void velocities(Matrix3Xd& v) const override { solver_->velocities(v); }
   void closing_velocities(double time, Matrix3Xd& v) override {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/model/self_weight.h"
 #include "core/model/text.h"
 #include "core/motion/sheet_solver.h"
 #include "core/motion/stability.h"
@@ -191,6 +192,27 @@ void warn_of_tension(const SheetDefinition& sheet, std::size_t index, Plan& plan
                                   " N/m: the shear connections pull along with the threads")});
 }
 
+std::string tensile_text(const Textile& textile) {
+  if (const auto* raw = std::get_if<RawTextile>(&textile.model)) return join(raw->stretch, " N/m");
+  const auto& measured = std::get<MeasuredTextile>(textile.model);
+  return join(measured.tensile_warp, " and ", measured.tensile_weft, " N/m");
+}
+
+void describe_stretch(const Scene& scene, std::size_t index, Plan& plan) {
+  const SheetDefinition& sheet = scene.sheets[index];
+  const auto [warp, weft] = self_weight_strain(sheet, scene.environment);
+  plan.stretch_costs.push_back({sheet.name, std::min(warp, weft)});
+  if (!scene.solver.max_self_weight_strain) return;
+  const double most = *scene.solver.max_self_weight_strain;
+  const Textile capped = cap_stretch(sheet, scene.environment, most);
+  if (capped == sheet.textile) return;
+  plan.warnings.push_back(
+      {"STRETCH_CAPPED", sheet_path(index) + ".textile",
+       join("a tensile stiffness of ", tensile_text(sheet.textile), " is simulated as ",
+            tensile_text(capped), ", with which the sheet, hung by an edge, stretches by ",
+            100 * most, " % under its own weight (solver.max_self_weight_strain)")});
+}
+
 void warn(const Scene& scene, const std::vector<SheetShape>& shapes, Plan& plan) {
   plan.warnings.push_back({"NO_SELF_COLLISION", "", "a sheet may pass through itself"});
   if (scene.sheets.size() > 1)
@@ -205,6 +227,7 @@ void warn(const Scene& scene, const std::vector<SheetShape>& shapes, Plan& plan)
   for (std::size_t s = 0; s < shapes.size(); ++s) {
     warn_of_bending(scene, s, shapes[s].mesh, plan);
     warn_of_tension(scene.sheets[s], s, plan);
+    describe_stretch(scene, s, plan);
   }
   if (plan.step.substep > plan.step.linear_bound)
     plan.warnings.push_back(
@@ -221,6 +244,7 @@ Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes) {
   for (std::size_t s = 0; s < shapes.size(); ++s) {
     describe_solver(scene, scene.sheets[s], plan);
     describe_families(scene.sheets[s], shapes[s].mesh, plan);
+    plan.particle_substeps += scene.sheets[s].particle_count() / plan.step.substep;
   }
   const auto pass = [&](const char* name, bool runs, const char* why_not) {
     if (runs)

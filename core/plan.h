@@ -36,13 +36,21 @@ struct BendingLimit {
   double finest_spacing = 0;   // h_min, m, for the curvature that weight gives the textile
 };
 
+// What resisting stretch costs: steps grow with the root of this strain.
+struct StretchCost {
+  std::string sheet;
+  double self_weight_strain = 0;  // as given; the smaller one of warp and weft
+};
+
 // What a scene needs: derived once, before the run.
 struct Plan {
   StepPlan step;
   std::vector<std::string> passes;
   std::vector<SkippedPass> skipped;
   std::vector<BendingLimit> bending_limits;  // of sheets with CHOI_KO bending
+  std::vector<StretchCost> stretch_costs;
   std::vector<Warning> warnings;
+  double particle_substeps = 0;  // of a simulated second
 };
 
 // Most substeps of a frame that are ever run.

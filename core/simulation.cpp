@@ -7,6 +7,7 @@
 #include "core/contact/contact.h"
 #include "core/forces/air.h"
 #include "core/forces/springs.h"
+#include "core/model/self_weight.h"
 #include "core/motion/guard.h"
 #include "core/motion/sheet_solver.h"
 
@@ -102,6 +103,7 @@ struct Simulation::State {
   std::string failure;
 
   State(Scene given, SolverFactory factory);
+  SheetDefinition stepped(std::size_t sheet) const;
   void bind_forces();
   void step(double time, double dt, Crew& crew);
   bool compute_frame(Crew& crew);
@@ -111,6 +113,14 @@ struct Simulation::State {
   Plan plan_for(const std::vector<Matrix3Xd>& x) const;
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
 };
+
+// A sheet as it is simulated.
+SheetDefinition Simulation::State::stepped(std::size_t sheet) const {
+  SheetDefinition definition = scene.sheets[sheet];
+  if (const auto& strain = scene.solver.max_self_weight_strain)
+    definition.textile = cap_stretch(definition, scene.environment, *strain);
+  return definition;
+}
 
 // One substep, from `time` to `time` + dt.
 void Simulation::State::step(double time, double dt, Crew& crew) {
@@ -153,7 +163,7 @@ Simulation::State::State(Scene given, SolverFactory factory)
       rest_after(end_of_paths(scene)) {
   std::vector<Matrix3Xd> x(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s) {
-    const SheetDefinition& definition = scene.sheets[s];
+    const SheetDefinition definition = stepped(s);
     set_textile_of(scene, definition, sheets[s]);
     sheets[s].start = x[s] = start_positions(definition);
     for (const Pin& pin : definition.pins)
@@ -164,7 +174,7 @@ Simulation::State::State(Scene given, SolverFactory factory)
 
   const double dt = plan.step.substep;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
-    const SheetDefinition& definition = scene.sheets[s];
+    const SheetDefinition definition = stepped(s);
     Matrix3Xd v = start_velocities(definition);
     for (const Pin& pin : definition.pins)
       for (const int i : pin.particles)
@@ -400,11 +410,11 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
   }
 
   const Textile old_textile = std::exchange(definition.textile, textile);
-  set_textile_of(state.scene, definition, state.sheets[index]);
+  set_textile_of(state.scene, state.stepped(index), state.sheets[index]);
   Plan plan = state.plan_for(x);
   if (const auto refused = refusal_of(plan.step, state.scene.solver.allow_unstable)) {
     definition.textile = old_textile;
-    set_textile_of(state.scene, definition, state.sheets[index]);
+    set_textile_of(state.scene, state.stepped(index), state.sheets[index]);
     return refused;
   }
   state.plan = std::move(plan);
@@ -413,7 +423,8 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
   const double new_dt = state.plan.step.substep;
   for (std::size_t s = 0; s < state.sheets.size(); ++s) {
     Sheet& sheet = state.sheets[s];
-    if (s == index) sheet.solver = state.make_solver(state.scene, definition, sheet.dynamics);
+    if (s == index)
+      sheet.solver = state.make_solver(state.scene, state.stepped(index), sheet.dynamics);
     if (s != index && new_dt == dt) continue;
     sheet.solver->start(x[s], v[s], state.time(), new_dt);
     sheet.read(sheet.good);

@@ -112,6 +112,13 @@ std::string plan_text(const v1::Plan& plan) {
   facts.add("close estimate", seconds_text(plan.estimated_bound_s()) + ", for the present shape")
       .add("damping ratio",
            number_text(plan.damping_ratio()) + " of the stiffest mode, 1 is critical");
+  facts.add("cost", fmt::format("{:.3g} million particle-substeps for a second",
+                                plan.particle_substeps_per_second() / 1e6));
+  for (const auto& cost : plan.stretch_costs()) {
+    if (!std::isfinite(cost.self_weight_strain())) continue;
+    facts.add("stretch", fmt::format("{}: {} under its own weight, hung by an edge", cost.sheet(),
+                                     percent_text(cost.self_weight_strain())));
+  }
   for (const auto& pass : plan.passes()) facts.add("pass", pass);
   for (const auto& skipped : plan.skipped())
     facts.add("skipped", skipped.pass() + ": " + skipped.reason());

@@ -122,6 +122,9 @@ struct SolverSettings {
   double safety = 0.9;  // planned substep / linear bound
   // Most halvings of the step by the guard; 0: only what is not finite stops a run.
   int max_repairs = 12;
+  // Most that a sheet may stretch under its own weight: stiffer textiles are simulated as soft as
+  // that, with longer steps. Absent: as stiff as given.
+  std::optional<double> max_self_weight_strain;
 };
 
 struct Scene {

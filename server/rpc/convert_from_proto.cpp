@@ -264,6 +264,8 @@ SolverSettings Reader::solver(const v1::SolverSettings& from) {
   solver.allow_unstable = from.allow_unstable();
   if (from.has_safety()) solver.safety = from.safety();
   if (from.has_max_repairs()) solver.max_repairs = from.max_repairs();
+  if (from.has_max_self_weight_strain())
+    solver.max_self_weight_strain = from.max_self_weight_strain();
   return solver;
 }
 

@@ -152,6 +152,7 @@ void set(v1::SolverSettings* to, const SolverSettings& from) {
   to->set_allow_unstable(from.allow_unstable);
   to->set_safety(from.safety);
   to->set_max_repairs(from.max_repairs);
+  if (from.max_self_weight_strain) to->set_max_self_weight_strain(*from.max_self_weight_strain);
   to->set_precision(from.precision == Precision::kSingle ? v1::PRECISION_SINGLE
                                                          : v1::PRECISION_DOUBLE);
 }
@@ -246,6 +247,12 @@ v1::Plan to_proto(const Plan& plan) {
     added->set_sheet(limit.sheet);
     added->set_least_curvature_per_m(limit.least_curvature);
     added->set_finest_spacing_m(limit.finest_spacing);
+  }
+  result.set_particle_substeps_per_second(plan.particle_substeps);
+  for (const auto& cost : plan.stretch_costs) {
+    v1::StretchCost* added = result.add_stretch_costs();
+    added->set_sheet(cost.sheet);
+    added->set_self_weight_strain(cost.self_weight_strain);
   }
   return result;
 }

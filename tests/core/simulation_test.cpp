@@ -74,15 +74,20 @@ TEST(Simulation, AHeldParticleNeverMovesAndALedOneNeverLeavesItsPath) {
   }
 }
 
-// The tension in a hanging strip is the weight below it: sum of m g / k over the rows.
-TEST(Simulation, AStripHungByOneEndStretchesByItsOwnWeight) {
+// 12 rows 0.05 m apart, of 0.01 kg a particle, hung by two.
+Scene hung_strip(double stretch) {
   SheetDefinition sheet = flat_sheet(12, 2, 0.05);
-  sheet.textile = {RawTextile{.particle_mass = 1e-2, .stretch = 200, .air_drag = 0.2}, 0.05, 0};
+  sheet.textile = {RawTextile{.particle_mass = 1e-2, .stretch = stretch, .air_drag = 0.2}, 0.05, 0};
   sheet.rotation = Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Vector3d::UnitX()));
   sheet.pins = {{{0, 1}, {}}};
   Scene scene = floating(sheet);
   scene.environment.gravity = {0, -9.8, 0};
-  Simulation simulation(scene);
+  return scene;
+}
+
+// The tension in a hanging strip is the weight below it: sum of m g / k over the rows.
+TEST(Simulation, AStripHungByOneEndStretchesByItsOwnWeight) {
+  Simulation simulation(hung_strip(200));
   while (!simulation.at_rest() && simulation.time() < 60) run(simulation, 1);
   ASSERT_TRUE(simulation.at_rest());
   double expected = 11 * 0.05;
@@ -124,6 +129,30 @@ TEST(Simulation, APlanWarnsOfWhatTheModelLeavesOut) {
   scene.colliders = {{"table", Box{Vector3d::Zero(), Vector3d(1, 1, 1)}, 0.3, {}}};
   EXPECT_TRUE(warns(scene, "NO_SHEET_SHEET_COLLISION"));
   EXPECT_TRUE(warns(scene, "BOX_EDGES"));
+}
+
+// The top connection carries 11 particles: 11 m g = k h 5 % is what the stiffness is capped to.
+TEST(Simulation, ATextileTooStiffToNoticeMayBeSimulatedAsSoftAsASelfWeightStrainAllows) {
+  Scene scene = hung_strip(1e5);
+  const std::int64_t substeps = Simulation(scene).plan().step.substeps;
+  EXPECT_FALSE(warns(scene, "STRETCH_CAPPED"));
+  EXPECT_DOUBLE_EQ(Simulation(scene).plan().stretch_costs[0].self_weight_strain,
+                   11 * 1e-2 * 9.8 / (0.05 * 1e5));
+
+  scene.solver.max_self_weight_strain = 0.05;
+  EXPECT_TRUE(warns(scene, "STRETCH_CAPPED"));
+  Simulation simulation(scene);
+  EXPECT_LT(6 * simulation.plan().step.substeps, substeps);
+  while (!simulation.at_rest() && simulation.time() < 60) run(simulation, 1);
+  double expected = 11 * 0.05;
+  for (int below = 1; below <= 11; ++below) expected += below * 0.05 * 0.05 / 11;
+  EXPECT_NEAR(-positions(simulation)(1, 22), expected, 2e-4 * expected);
+
+  // what is softer stays as it is, also when it is set later
+  std::get<RawTextile>(scene.sheets[0].textile.model).stretch = 200;
+  EXPECT_FALSE(warns(scene, "STRETCH_CAPPED"));
+  EXPECT_FALSE(simulation.set_textile(0, scene.sheets[0].textile));
+  EXPECT_EQ(simulation.plan().step.substeps, Simulation(scene).plan().step.substeps);
 }
 
 // c_b L^3 / k_b = 2000 x 0.1^3 / k_b falls below 31.47 at k_b = 0.0636; L is 0.1 on the axes.

@@ -1,0 +1,47 @@
+#include "core/model/self_weight.h"
+
+#include <algorithm>
+
+namespace weft {
+namespace {
+
+// rho g H of a sheet that hangs along warp and along weft, N/m.
+struct Load {
+  double warp, weft;
+};
+Load load_of(const SheetDefinition& sheet, const Environment& environment) {
+  const double given = environment.gravity.norm();
+  const double gravity = given > 0 ? given : kStandardGravity;
+  const double h = sheet.grid.spacing;
+  const auto* measured = std::get_if<MeasuredTextile>(&sheet.textile.model);
+  const double areal_density =
+      measured != nullptr ? measured->areal_density
+                          : std::get<RawTextile>(sheet.textile.model).particle_mass / (h * h);
+  const double weight = areal_density * gravity;
+  return {weight * (sheet.grid.columns - 1) * h, weight * (sheet.grid.rows - 1) * h};
+}
+
+}  // namespace
+
+SelfWeightStrain self_weight_strain(const SheetDefinition& sheet, const Environment& environment) {
+  const Load load = load_of(sheet, environment);
+  if (const auto* measured = std::get_if<MeasuredTextile>(&sheet.textile.model))
+    return {load.warp / measured->tensile_warp, load.weft / measured->tensile_weft};
+  const double stretch = std::get<RawTextile>(sheet.textile.model).stretch;
+  return {load.warp / stretch, load.weft / stretch};
+}
+
+Textile cap_stretch(const SheetDefinition& sheet, const Environment& environment, double strain) {
+  const Load load = load_of(sheet, environment);
+  Textile textile = sheet.textile;
+  if (auto* measured = std::get_if<MeasuredTextile>(&textile.model)) {
+    measured->tensile_warp = std::min(measured->tensile_warp, load.warp / strain);
+    measured->tensile_weft = std::min(measured->tensile_weft, load.weft / strain);
+  } else {
+    auto& raw = std::get<RawTextile>(textile.model);
+    raw.stretch = std::min(raw.stretch, std::max(load.warp, load.weft) / strain);
+  }
+  return textile;
+}
+
+}  // namespace weft

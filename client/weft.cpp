@@ -68,6 +68,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_pause(app, context);
   add_step(app, context);
   add_watch(app, context);
+  add_top(app, context);
   add_record(app, context);
   add_info(app, context);
   add_verify(app, context);

@@ -91,6 +91,8 @@ void read_file(const std::string& path, Config& config) {
       set(*number, value_of<std::int64_t>(node, where, "a whole number"), where);
     } else if (key == "host") {
       config.server.host = value_of<std::string>(node, where, "a text");
+    } else if (key == "metrics") {
+      config.server.metrics = value_of<std::string>(node, where, "a text");
     } else if (key == "data_dir") {
       config.server.data_dir = value_of<std::string>(node, where, "a text");
     } else if (key == "insecure") {
@@ -98,7 +100,7 @@ void read_file(const std::string& path, Config& config) {
     } else if (key == "log_level") {
       set_log_level(config, value_of<std::string>(node, where, "a text"), where);
     } else {
-      std::string keys = "host, data_dir, insecure, log_level";
+      std::string keys = "host, metrics, data_dir, insecure, log_level";
       for (const auto& each : known) keys += std::string(", ") + each.key;
       refuse(where + " is not known; there are " + keys);
     }
@@ -122,6 +124,27 @@ bool is_loopback(const std::string& host) {
   return host == "localhost" || host == "[::1]" || (number && host.starts_with("127."));
 }
 
+void check_reach(const std::string& key, const std::string& value, const std::string& host,
+                 const Config& config) {
+  if (is_loopback(host) || config.insecure) return;
+  refuse(key + " is " + value +
+         ", which other machines can reach, and nothing is encrypted; add --insecure if that is "
+         "what you want");
+}
+
+// "HOST:PORT", or none.
+void check_metrics(Config& config) {
+  std::optional<std::string>& metrics = config.server.metrics;
+  if (*metrics == "none") return metrics.reset();
+  const std::size_t colon = metrics->rfind(':');
+  const std::string port = colon == std::string::npos ? "" : metrics->substr(colon + 1);
+  const bool digits = !port.empty() && port.size() <= 5 &&
+                      port.find_first_not_of("0123456789") == std::string::npos;
+  if (colon == 0 || !digits || std::stoi(port) > 65535)
+    refuse("metrics is \"" + *metrics + "\", not an address and a port like 127.0.0.1:9464");
+  check_reach("metrics", *metrics, metrics->substr(0, colon), config);
+}
+
 }  // namespace
 
 Config read_config(int argc, const char* const* argv) {
@@ -131,11 +154,13 @@ Config read_config(int argc, const char* const* argv) {
 
   CLI::App app("weftd - the Weft server: simulates textiles and streams their frames over gRPC.",
                "weftd");
-  std::string file, host, data_dir, log_level;
+  std::string file, host, metrics, data_dir, log_level;
   bool insecure = false;
   app.add_option("--config", file, "TOML file; its keys are the flags below, with _ for -")
       ->type_name("FILE");
   app.add_option("--host", host, "Address to listen on [" + *config.server.host + "]")
+      ->type_name("ADDRESS");
+  app.add_option("--metrics", metrics, "Address and port to serve Prometheus' metrics at, or none")
       ->type_name("ADDRESS");
   app.add_option("--data-dir", data_dir, "Directory that keeps sessions, or none")
       ->type_name("DIR");
@@ -172,16 +197,14 @@ Config read_config(int argc, const char* const* argv) {
     if (app.count(flag) > 0) set(known[i], values[i], flag);
   }
   if (app.count("--host") > 0) config.server.host = host;
+  config.insecure |= insecure;
+  if (app.count("--metrics") > 0) config.server.metrics = metrics;
+  if (config.server.metrics) check_metrics(config);
   if (app.count("--data-dir") > 0) config.server.data_dir = data_dir;
   if (config.server.data_dir->empty()) refuse("data_dir is empty; give a directory, or none");
   if (*config.server.data_dir == "none") config.server.data_dir.reset();
   if (app.count("--log-level") > 0) set_log_level(config, log_level, "--log-level");
-  config.insecure |= insecure;
-  if (!is_loopback(*config.server.host) && !config.insecure) {
-    refuse("host is " + *config.server.host +
-           ", which other machines can reach, and nothing is encrypted; add --insecure if that is "
-           "what you want");
-  }
+  check_reach("host", *config.server.host, *config.server.host, config);
   return config;
 }
 

@@ -27,6 +27,7 @@ int serve(const weft::Config& config) {
   weft::Server server(config.server);
   std::printf("weftd listening on %s\n", server.address().c_str());
   std::fflush(stdout);
+  if (config.server.metrics) spdlog::info("metrics at http://{}/metrics", server.metrics_address());
   spdlog::info("version {}, {} workers", WEFT_VERSION, config.server.worker_threads);
 
   int signal = 0;

@@ -8,6 +8,7 @@
 
 #include "server/rpc/backend.h"
 #include "server/rpc/frame_service.h"
+#include "server/rpc/metrics.h"
 #include "server/rpc/restore.h"
 #include "server/rpc/server_service.h"
 #include "server/rpc/session_service.h"
@@ -57,6 +58,7 @@ struct Server::Parts {
   ServerService server{backend};
   TextileService textiles;
   std::unique_ptr<grpc::Server> grpc;
+  std::optional<Metrics> metrics;
   bool stopped = false;
 };
 
@@ -81,6 +83,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
                              ": is the port taken, or the address another machine's?");
   }
   if (options.host) address_ = *options.host + ":" + std::to_string(port);
+  if (options.metrics) parts_->metrics.emplace(parts_->backend, *options.metrics);
   for (const char* service : kServices) {
     parts_->grpc->GetHealthCheckService()->SetServingStatus(service, true);
   }
@@ -90,6 +93,10 @@ Server::~Server() {
   stop();
   parts_->backend.planner.stop();    // the scene it is at still needs the services
   parts_->backend.scheduler.stop();  // and sessions the store
+}
+
+std::string Server::metrics_address() const {
+  return parts_->metrics ? parts_->metrics->address() : "";
 }
 
 std::shared_ptr<grpc::Channel> Server::in_process_channel() {

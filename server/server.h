@@ -16,6 +16,7 @@ struct ServerOptions {
   std::optional<std::string> host = "127.0.0.1";  // absent: reached by in_process_channel() only
   int port = 0;                                   // 0: a free one
   int worker_threads = static_cast<int>(std::thread::hardware_concurrency());
+  std::optional<std::string> metrics;   // "127.0.0.1:9464"; absent: none
   std::optional<std::string> data_dir;  // where sessions are kept; absent: they end with the server
   Limits limits;
 };
@@ -29,6 +30,7 @@ class Server {
   ~Server();  // stops
 
   const std::string& address() const { return address_; }  // "127.0.0.1:41234"; empty without host
+  std::string metrics_address() const;                     // empty without metrics
 
   // A channel without a network.
   std::shared_ptr<grpc::Channel> in_process_channel();

@@ -4,6 +4,7 @@
 #include <google/protobuf/util/time_util.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "client/output/text.h"
 
@@ -94,6 +95,17 @@ std::string session_text(const v1::Session& session) {
   }
   if (!session.failure().empty()) facts.add("failure", session.failure());
   return facts.text();
+}
+
+v1::ListSessionsResponse list_sessions(Connection& connection) {
+  v1::ListSessionsRequest request;
+  v1::ListSessionsResponse all;
+  do {
+    v1::ListSessionsResponse page = connection.call(&Sessions::ListSessions, request);
+    all.mutable_sessions()->MergeFrom(page.sessions());
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  return all;
 }
 
 std::string plan_text(const v1::Plan& plan) {

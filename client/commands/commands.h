@@ -15,6 +15,7 @@ void add_textile(CLI::App& app, Context& context);
 void add_run(CLI::App& app, Context& context);
 void add_pause(CLI::App& app, Context& context);
 void add_step(CLI::App& app, Context& context);
+void add_top(CLI::App& app, Context& context);
 void add_watch(CLI::App& app, Context& context);
 void add_record(CLI::App& app, Context& context);
 void add_info(CLI::App& app, Context& context);
@@ -26,6 +27,7 @@ void add_health(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
 
 using Sessions = v1::SessionService::Stub;
+using Servers = v1::ServerService::Stub;
 using Textiles = v1::TextileService::Stub;
 
 // A command that only holds others.
@@ -37,6 +39,9 @@ void add_session_or_scene_argument(CLI::App& command, std::string& given);
 
 // "A:B", both included; either may be left out, and an empty text is all frames.
 FrameRange read_frame_range(const std::string& text);
+
+// All of them, from as many pages as it takes.
+v1::ListSessionsResponse list_sessions(Connection& connection);
 
 // "paused"
 std::string state_text(v1::SessionState state);

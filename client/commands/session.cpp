@@ -18,15 +18,8 @@ void run_create(Context& context, const CreateOptions& options) {
   context.answer(to_json(session), "created " + session.name() + '\n' + plan_text(session.plan()));
 }
 
-void list_sessions(Context& context) {
-  v1::ListSessionsRequest request;
-  v1::ListSessionsResponse all;
-  do {
-    v1::ListSessionsResponse page = context.connection().call(&Sessions::ListSessions, request);
-    all.mutable_sessions()->MergeFrom(page.sessions());
-    request.set_page_token(page.next_page_token());
-  } while (!request.page_token().empty());
-
+void run_list(Context& context) {
+  const v1::ListSessionsResponse all = list_sessions(context.connection());
   Table table({"SESSION", "STATE", "FRAME", "TIME", "AT REST", "SHEETS"});
   for (const auto& session : all.sessions()) {
     table.add({session.name(), state_text(session.state()), std::to_string(session.frame()),
@@ -68,7 +61,7 @@ void add_session(CLI::App& app, Context& context) {
   command->callback([&context, create] { run_create(context, *create); });
 
   command = session->add_subcommand("list", "List all sessions");
-  command->callback([&context] { list_sessions(context); });
+  command->callback([&context] { run_list(context); });
 
   auto name = std::make_shared<std::string>();
   command = session->add_subcommand("get", "Show one session");

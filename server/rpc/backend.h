@@ -1,5 +1,7 @@
 #pragma once
 
+#include <spdlog/spdlog.h>
+
 #include <atomic>
 #include <cstddef>
 #include <memory>
@@ -24,11 +26,17 @@ struct Backend {
         store(std::move(sessions)),
         registry(static_cast<std::size_t>(given.max_sessions)) {}
 
+  SessionHost host() {
+    return {scheduler, stats, static_cast<std::size_t>(limits.history_bytes_per_session),
+            [](const std::string& line) { spdlog::warn(line); }};
+  }
+
   const Limits limits;
   const int worker_threads;
   std::atomic<bool> draining = false;  // sessions are not created or changed any more
   OpenCalls calls;
   Requests requests;
+  Stats stats;
   Scheduler scheduler;
   Scheduler planner{1};
   const std::unique_ptr<SessionStore> store;

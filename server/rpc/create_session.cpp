@@ -1,5 +1,3 @@
-#include <spdlog/spdlog.h>
-
 #include <new>
 #include <utility>
 
@@ -165,10 +163,8 @@ grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
   Simulation simulation(std::move(scene));
   if (const auto refusal = simulation.refusal()) return refused_step(simulation, *refusal);
   const SessionIdentity identity = make_identity(id, numerics_id());
-  const auto session = std::make_shared<Session>(
-      identity, std::move(simulation),
-      static_cast<std::size_t>(backend_.limits.history_bytes_per_session), backend_.scheduler,
-      backend_.store->log_of(identity.uid, 0), [](const std::string& line) { spdlog::warn(line); });
+  const auto session = std::make_shared<Session>(identity, std::move(simulation), backend_.host(),
+                                                 backend_.store->log_of(identity.uid, 0));
   response = to_proto(*session);
   if (request.validate_only()) {
     response.clear_name();

@@ -13,7 +13,8 @@ class FrameService final
     : public v1::FrameService::WithRawCallbackMethod_StreamFrames<v1::FrameService::Service> {
  public:
   explicit FrameService(Backend& backend)
-      : backend_(backend), streams_(static_cast<std::size_t>(backend.limits.max_streams)) {}
+      : backend_(backend),
+        streams_(static_cast<std::size_t>(backend.limits.max_streams), backend.stats) {}
 
   void drain() { streams_.drain(); }
 

@@ -127,13 +127,14 @@ void FrameStream::read_on(bool progress_due) {
     case Reading::Kind::kFrame:
       last_frame_ = reading.frame->number;
       repairs_.assign(reading.frame->repairs.begin(), reading.frame->repairs.end());
-      return write(encoded_frame(*reading.frame, request_.format()));
+      return write_frame(*reading.frame);
     case Reading::Kind::kNothingYet:
       if (progress_due || reading.progress.state_changes != state_changes_) {
         write_progress(reading.progress);
       }
       return;
     case Reading::Kind::kExpired:
+      ++backend_.stats.slow_readers;
       return finish(errors::frame_expired(subscription_->next_frame(), reading.progress));
     case Reading::Kind::kFailed:
       return finish(
@@ -148,6 +149,13 @@ void FrameStream::write(grpc::ByteBuffer message) {
   writing_ = true;
   last_write_ = Clock::now();
   StartWrite(&message_);
+}
+
+void FrameStream::write_frame(const Frame& frame) {
+  grpc::ByteBuffer message = encoded_frame(frame, request_.format());
+  ++backend_.stats.frames_sent;
+  backend_.stats.bytes_sent += static_cast<std::int64_t>(message.Length());
+  write(std::move(message));
 }
 
 void FrameStream::write_header() {

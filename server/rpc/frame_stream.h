@@ -42,6 +42,7 @@ class FrameStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer>,
   grpc::Status check() const;
   void read_on(bool progress_due);
   void write(grpc::ByteBuffer message);
+  void write_frame(const Frame& frame);
   void write_header();
   void write_progress(const Progress& progress);
   void write_repair();

@@ -7,8 +7,10 @@
 
 namespace weft {
 
-FrameStreams::FrameStreams(std::size_t max_streams)
-    : max_streams_(max_streams), thread_([this](const std::stop_token& stop) { remind(stop); }) {}
+FrameStreams::FrameStreams(std::size_t max_streams, Stats& stats)
+    : max_streams_(max_streams),
+      stats_(stats),
+      thread_([this](const std::stop_token& stop) { remind(stop); }) {}
 
 FrameStreams::~FrameStreams() = default;
 
@@ -21,13 +23,14 @@ grpc::Status FrameStreams::add(std::shared_ptr<FrameStream> stream) {
         true);
   }
   streams_.insert(std::move(stream));
+  ++stats_.streams;
   changed_.notify_one();
   return grpc::Status::OK;
 }
 
 void FrameStreams::remove(const std::shared_ptr<FrameStream>& stream) {
   std::lock_guard lock(mutex_);
-  streams_.erase(stream);
+  stats_.streams -= static_cast<std::int64_t>(streams_.erase(stream));
 }
 
 void FrameStreams::drain() {

@@ -10,6 +10,8 @@
 #include <set>
 #include <thread>
 
+#include "server/session/stats.h"
+
 namespace weft {
 
 class FrameStream;
@@ -21,7 +23,7 @@ class FrameStreams {
   static constexpr std::chrono::milliseconds kTick{250};
   static constexpr std::chrono::milliseconds kProgressInterval{1750};
 
-  explicit FrameStreams(std::size_t max_streams);
+  FrameStreams(std::size_t max_streams, Stats& stats);
   ~FrameStreams();
 
   // Why the stream is not one of them.
@@ -35,6 +37,7 @@ class FrameStreams {
   void remind(const std::stop_token& stop);
 
   const std::size_t max_streams_;
+  Stats& stats_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::set<std::shared_ptr<FrameStream>> streams_;

@@ -28,11 +28,9 @@ void restore(Backend& backend, LeftSession left) {
     spdlog::warn("{} was created with numerics {}; its frames may differ in their last bits now",
                  session_name(identity.id), identity.numerics_id);
   }
-  const auto session = std::make_shared<Session>(
-      identity, std::move(simulation),
-      static_cast<std::size_t>(backend.limits.history_bytes_per_session), backend.scheduler,
-      backend.store->log_of(identity.uid, left.past.log.size()),
-      [](const std::string& line) { spdlog::warn(line); });
+  const auto session =
+      std::make_shared<Session>(identity, std::move(simulation), backend.host(),
+                                backend.store->log_of(identity.uid, left.past.log.size()));
   backend.registry.restore(session);
   session->restore(std::move(left.past));
 }

@@ -1,6 +1,7 @@
 #include "server/rpc/server_service.h"
 
 #include "core/motion/lattice_sweep.h"
+#include "server/rpc/server_stats.h"
 
 namespace weft {
 
@@ -22,6 +23,15 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
   limits->set_max_streams(backend_.limits.max_streams);
   limits->set_max_request_bytes(backend_.limits.max_request_bytes);
   limits->set_max_frame_bytes(backend_.limits.max_frame_bytes);
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(grpc::Status::OK);
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* ServerService::GetServerStats(grpc::CallbackServerContext* context,
+                                                        const v1::GetServerStatsRequest*,
+                                                        v1::ServerStats* response) {
+  *response = server_stats(backend_);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(grpc::Status::OK);
   return reactor;

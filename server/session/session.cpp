@@ -34,17 +34,18 @@ SessionIdentity make_identity(std::string id, std::string numerics_id) {
   return {std::move(id), make_uid(), std::move(numerics_id), std::chrono::system_clock::now()};
 }
 
-Session::Session(SessionIdentity identity, Simulation simulation, std::size_t history_bytes,
-                 Scheduler& scheduler, std::unique_ptr<SessionLog> log, Notify notify)
+Session::Session(SessionIdentity identity, Simulation simulation, const SessionHost& host,
+                 std::unique_ptr<SessionLog> log)
     : identity_(std::move(identity)),
-      scheduler_(scheduler),
+      scheduler_(host.scheduler),
+      stats_(host.stats),
       log_(std::move(log)),
-      notify_(std::move(notify)),
+      notify_(host.notify),
       simulation_(std::move(simulation)),
       scene_(simulation_.scene()),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),
-      history_(history_bytes) {
+      history_(host.history_bytes) {
   history_.push(make_frame({}), 0);
 }
 
@@ -67,7 +68,7 @@ void Session::restore(SessionPast past) {
 
 SessionStatus Session::status() const {
   std::lock_guard lock(mutex_);
-  return {state_, history_.latest(), textiles_, plan_, repairs_, failure_};
+  return {state_, history_.latest(), textiles_, plan_, repairs_, failure_, lateness_};
 }
 
 void Session::submit(Command command) {
@@ -115,7 +116,7 @@ std::optional<Clock::time_point> Session::run_slice() {
     write_reach();
     const auto due = next_due();
     if (!due || *due > Clock::now()) return due;
-    compute_frame();
+    compute_frame(*due);
     if (!settle()) return std::nullopt;
     write_reach();
   } catch (const std::bad_alloc&) {
@@ -208,6 +209,7 @@ void Session::fail(const std::string& why) {
     restoring_.reset();
     set_state(SessionState::kFailed);
   }
+  ++stats_.failures;
   if (notify_) notify_("session " + identity_.id + " failed: " + failure_);
   offer_to_all();
 }
@@ -526,21 +528,40 @@ void Session::end_step() {
   });
 }
 
-void Session::compute_frame() {
+void Session::compute_frame(Clock::time_point due) {
+  const auto begin = Clock::now();
   const bool good = advance_frame();
+  const auto end = Clock::now();
   auto repairs = take_repairs();
   if (!good) return fail("the solver diverged: " + simulation_.failure());
+  count_frame(end - begin);
   const auto frame = make_frame(std::move(repairs));
   {
     std::lock_guard lock(mutex_);
     if (closed_) return;
     history_.push(frame, first_held_frame());
+    lateness_ = {};
+    if (due != Clock::time_point::min()) {
+      lateness_ = end - due;
+      stats_.lateness.add(lateness_);
+    }
     if (run_ && reached(*run_)) {
       run_.reset();
       set_state(SessionState::kPaused);
     }
   }
   offer_to_all();
+}
+
+void Session::count_frame(std::chrono::duration<double> time) {
+  ++stats_.frames;
+  if (simulation_.substeps() == 0) {
+    ++stats_.sleeping_frames;
+    return;
+  }
+  stats_.substeps += simulation_.substeps();
+  stats_.particle_substeps += simulation_.substeps() * simulation_.particle_count();
+  stats_.frame_time.add(time);
 }
 
 bool Session::advance_frame() {
@@ -558,6 +579,7 @@ std::vector<Repair> Session::take_repairs() {
     std::lock_guard lock(mutex_);
     taken.assign(all.begin() + static_cast<std::ptrdiff_t>(repairs_.size()), all.end());
     if (taken.empty()) return taken;
+    stats_.repairs += static_cast<std::int64_t>(taken.size());
     repairs_ = all;
     plan_ = std::make_shared<const Plan>(simulation_.plan());
   }

@@ -16,6 +16,7 @@
 #include "server/session/history.h"
 #include "server/session/log.h"
 #include "server/session/scheduler.h"
+#include "server/session/stats.h"
 #include "server/session/subscription.h"
 
 namespace weft {
@@ -39,6 +40,7 @@ struct SessionStatus {
   std::shared_ptr<const Plan> plan;
   std::vector<Repair> repairs;  // all so far
   std::string failure;
+  std::chrono::duration<double> lateness{};  // of the newest frame, where it runs at a pace
 };
 
 // What a session did before, in another process.
@@ -49,6 +51,14 @@ struct SessionPast {
 // Hears what an operator should know: repairs and failures, a line each. Called from any thread,
 // with no lock held. Must not block.
 using Notify = std::function<void(const std::string& line)>;
+
+// Where sessions live. The scheduler and the stats outlive them.
+struct SessionHost {
+  Scheduler& scheduler;
+  Stats& stats;
+  std::size_t history_bytes;  // at least two frames are kept, more as long as they fit
+  Notify notify = {};
+};
 
 // A simulation that advances on a scheduler. Calls reach it as commands that are carried out
 // between two frames, each when it is safe in the log; frames leave as shared, constant values. All
@@ -62,10 +72,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   // How long a session that was restored waits for subscribers that it had held frames for.
   static constexpr std::chrono::seconds kHoldAfterRestore{30};
 
-  // PAUSED at frame 0. Precondition: the simulation has no refusal. The scheduler outlives the
-  // session; at least two frames are kept, more as long as they fit into `history_bytes`.
-  Session(SessionIdentity identity, Simulation simulation, std::size_t history_bytes,
-          Scheduler& scheduler, std::unique_ptr<SessionLog> log, Notify notify = {});
+  // PAUSED at frame 0. Precondition: the simulation has no refusal.
+  Session(SessionIdentity identity, Simulation simulation, const SessionHost& host,
+          std::unique_ptr<SessionLog> log);
 
   // Computes again what there was before any command is carried out, then goes on as it was. Called
   // at most once, first.
@@ -149,8 +158,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Outcome apply(const RunBegun& run);
   Outcome pause();
   Outcome apply(const TextileSet& change);
-  void compute_frame();
+  void compute_frame(Clock::time_point due);
   bool advance_frame();
+  void count_frame(std::chrono::duration<double> time);
   std::vector<Repair> take_repairs();
   void fail(const std::string& why);
   std::optional<Clock::time_point> next_due();
@@ -182,6 +192,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
 
   const SessionIdentity identity_;
   Scheduler& scheduler_;
+  Stats& stats_;
   const std::unique_ptr<SessionLog> log_;
   const Notify notify_;
   Simulation simulation_;                  // touched by the slice only
@@ -199,6 +210,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::vector<Textile> textiles_;
   std::shared_ptr<const Plan> plan_;
   std::vector<Repair> repairs_;
+  std::chrono::duration<double> lateness_{};
   History history_;
   std::vector<Subscription*> subscriptions_;
   bool held_ = false;  // idle until a subscriber comes, or reads on

@@ -71,7 +71,8 @@ class SessionLogTest : public ::testing::Test {
  protected:
   std::shared_ptr<Session> make(const std::shared_ptr<Disk>& disk) {
     return std::make_shared<Session>(make_identity("test", "test"), Simulation(hung_scene()),
-                                     kMuchHistory, scheduler_, std::make_unique<DiskLog>(disk));
+                                     SessionHost{scheduler_, stats(), kMuchHistory},
+                                     std::make_unique<DiskLog>(disk));
   }
   // The session that another process would have.
   std::shared_ptr<Session> restored(const SessionPast& past) {

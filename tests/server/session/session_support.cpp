@@ -37,10 +37,16 @@ Scene diverging_scene() {
   return scene;
 }
 
+Stats& stats() {
+  static Stats all;
+  return all;
+}
+
 std::shared_ptr<Session> make_session(Scheduler& scheduler, const Scene& scene,
                                       std::size_t history_bytes, const std::string& id) {
-  return std::make_shared<Session>(make_identity(id, "test"), Simulation(scene), history_bytes,
-                                   scheduler, std::make_unique<NoLog>());
+  return std::make_shared<Session>(make_identity(id, "test"), Simulation(scene),
+                                   SessionHost{scheduler, stats(), history_bytes},
+                                   std::make_unique<NoLog>());
 }
 
 std::size_t history_of(std::size_t frames) {

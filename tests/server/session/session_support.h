@@ -18,6 +18,9 @@ Scene hung_scene();
 // One whose solver diverges after a few frames.
 Scene diverging_scene();
 
+// Of all sessions.
+Stats& stats();
+
 constexpr std::size_t kMuchHistory = 64 << 20;
 
 std::shared_ptr<Session> make_session(Scheduler& scheduler, const Scene& scene = hung_scene(),

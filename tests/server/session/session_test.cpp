@@ -273,10 +273,12 @@ TEST(Session, RepairsAFaultInTheMiddleOfARunAndTellsOfIt) {
       Simulation(hung_scene(),
                  faulty_solvers(
                      {.frame = 7, .times = 2, .jump = std::numeric_limits<double>::quiet_NaN()})),
-      kMuchHistory, scheduler, std::make_unique<NoLog>(), [&](const std::string& line) {
-        std::lock_guard lock(mutex);
-        lines.push_back(line);
-      });
+      SessionHost{scheduler, stats(), kMuchHistory,
+                  [&](const std::string& line) {
+                    std::lock_guard lock(mutex);
+                    lines.push_back(line);
+                  }},
+      std::make_unique<NoLog>());
   const std::int64_t planned = session->status().plan->step.substeps;
   const auto watcher = Watcher::of(*session, 1);
   step(*session, 20).applied();
@@ -299,7 +301,7 @@ TEST(Session, FailsWhenRepairsAreUsedUpWithItsLastGoodFrameReadable) {
   const auto session = std::make_shared<Session>(
       make_identity("test", "test"),
       Simulation(hung_scene(), faulty_solvers({.frame = 7, .times = 1000, .jump = 1e300})),
-      kMuchHistory, scheduler, std::make_unique<NoLog>());
+      SessionHost{scheduler, stats(), kMuchHistory}, std::make_unique<NoLog>());
   const auto watcher = Watcher::of(*session, 1);
   EXPECT_EQ(step(*session, 20).refused(), Refusal::Why::kFailed);
   const SessionStatus status = session->status();

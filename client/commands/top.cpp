@@ -107,9 +107,8 @@ std::string sessions_text(const Look& now, const Look& before) {
 
 void show(Context& context, Status& status, const Look& now, const Look& before) {
   if (context.json) {
-    Json json = to_json(now.stats);
-    json["seconds"] = now.stats.uptime_s() - before.stats.uptime_s();
-    json.update(to_json(now.sessions));
+    Json json = to_json(now.sessions);
+    json["stats"] = to_json(now.stats);
     return context.answer(json);
   }
   const std::string text = server_text(now.stats, before.stats) + '\n' + sessions_text(now, before);

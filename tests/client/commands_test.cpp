@@ -121,6 +121,17 @@ TEST_F(CommandsTest, HealthSaysWhetherTheServerTakesCalls) {
   EXPECT_EQ(weft({"health"}).exit, 3);
 }
 
+TEST_F(CommandsTest, TopShowsTheServerAndItsSessions) {
+  ask({"session", "create", scene_file(small_scene()), "--id", "drape"});
+  ask({"step", "drape", "--frames", "5"});
+  const auto look = ask({"top", "--looks", "1", "--interval", "0.05"});
+  EXPECT_EQ(look["sessions"][0]["name"], "sessions/drape");
+  EXPECT_EQ(look["stats"]["frames"], 5);
+  const std::string text = weft({"top", "--looks", "1", "--interval", "0.05"}).out;
+  EXPECT_THAT(text, HasSubstr("1 paused"));
+  EXPECT_THAT(text, HasSubstr("sessions/drape"));
+}
+
 TEST_F(CommandsTest, HelpIsAnAnswer) {
   const Outcome help = weft({"--help"});
   EXPECT_EQ(help.exit, 0);

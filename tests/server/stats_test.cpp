@@ -1,0 +1,124 @@
+#include "server/session/stats.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "tests/support/service/service.h"
+
+namespace weft::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+
+TEST(DurationHistogram, PutsADurationIntoTheFirstBucketThatHoldsIt) {
+  DurationHistogram histogram;
+  histogram.add(0s);
+  histogram.add(64us);
+  histogram.add(65us);
+  histogram.add(24h);
+  EXPECT_EQ(histogram.count(0), 2);
+  EXPECT_EQ(histogram.count(1), 1);
+  EXPECT_EQ(histogram.count(DurationHistogram::kBuckets - 1), 1);
+  EXPECT_NEAR(histogram.sum(), 86400 + 129e-6, 1e-9);
+}
+
+v1::ServerStats stats_of(Service& service) {
+  grpc::ClientContext context;
+  v1::ServerStats stats;
+  EXPECT_TRUE(service.servers->GetServerStats(&context, {}, &stats).ok());
+  return stats;
+}
+
+TEST(ServerStats, CountWhatWasComputedAndSent) {
+  Service service;
+  const v1::Session session = service.create();
+  service.create();
+  service.step(session, 10);
+  EXPECT_THAT(Stream(service, frames_of(session, 0, 10)).rest(), ::testing::SizeIs(11));
+
+  const v1::ServerStats stats = stats_of(service);
+  EXPECT_EQ(stats.sessions().paused(), 2);
+  EXPECT_EQ(stats.sessions().running(), 0);
+  EXPECT_EQ(stats.frames(), 10);
+  EXPECT_EQ(stats.substeps(), 10 * session.plan().substeps_per_frame());
+  EXPECT_EQ(stats.particle_substeps(), 20 * stats.substeps());
+  EXPECT_EQ(stats.frames_sent(), 11);
+  EXPECT_GT(stats.bytes_sent(), 11 * 20 * 3 * 4);
+  std::int64_t timed = 0;
+  for (const std::int64_t count : stats.frame_time_s().counts()) timed += count;
+  EXPECT_EQ(timed, 10);
+}
+
+TEST(ServerStats, CountOpenStreams) {
+  Service service;
+  const v1::Session session = service.create();
+  {
+    Stream stream(service, frames_of(session));
+    stream.header();
+    EXPECT_EQ(stats_of(service).streams(), 1);
+  }
+  while (stats_of(service).streams() > 0) {
+  }
+}
+
+TEST(ServerStats, SayHowLatePacedFramesAre) {
+  Service service;
+  const v1::Session session = service.create();
+  v1::RunSessionRequest request;
+  request.set_name(session.name());
+  request.set_time_scale(1000);  // 16.7 us a frame: too fast
+  request.set_until_frame(50);
+  v1::RunSessionResponse response;
+  ASSERT_TRUE(service.call(&Service::Sessions::RunSession, request, &response).ok());
+  while (service.get(session).frame() < 50) {
+  }
+  EXPECT_GT(service.get(session).lateness_s(), 0);
+  EXPECT_GT(stats_of(service).lateness_s().sum(), 0);
+}
+
+// What an HTTP server answers to GET /metrics.
+std::string metrics_at(const std::string& address) {
+  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port =
+      htons(static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1))));
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
+  const std::string request = "GET /metrics HTTP/1.0\r\n\r\n";
+  EXPECT_EQ(send(socket, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
+  std::string answer;
+  char bytes[4096];
+  for (ssize_t n; (n = recv(socket, bytes, sizeof bytes, 0)) > 0;)
+    answer.append(bytes, static_cast<std::size_t>(n));
+  close(socket);
+  return answer;
+}
+
+TEST(Metrics, TellPrometheusTheSame) {
+  ServerOptions options = Service::in_process();
+  options.metrics = "127.0.0.1:0";
+  Service service(options);
+  const v1::Session session = service.create();
+  service.step(session, 10);
+  const std::string text = metrics_at(service.server.metrics_address());
+  EXPECT_THAT(text, HasSubstr("200 OK"));
+  EXPECT_THAT(text, HasSubstr("\nweft_frames_total 10\n"));
+  EXPECT_THAT(text, HasSubstr("\nweft_sessions{state=\"paused\"} 1\n"));
+  EXPECT_THAT(text, HasSubstr("\nweft_frame_time_seconds_count 10\n"));
+}
+
+TEST(Metrics, AtAnAddressThatCannotBeHadKeepTheServerFromStarting) {
+  ServerOptions options = Service::in_process();
+  options.metrics = "192.0.2.1:9464";  // no machine has it (RFC 5737)
+  EXPECT_THROW(Service{options}, std::runtime_error);
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -207,6 +207,7 @@ TEST(Config, NamesFileLineKeyValueAndBoundOfWhatIsWrong) {
 TEST(Config, RefusesToListenBeyondThisMachineUnlessToldTwice) {
   EXPECT_THAT(refusal({"--host", "0.0.0.0"}), HasSubstr("--insecure"));
   EXPECT_THAT(refusal({"--host", "127.example.com"}), HasSubstr("--insecure"));
+  EXPECT_THAT(refusal({"--metrics", "0.0.0.0:9464"}), HasSubstr("--insecure"));
   EXPECT_EQ(config({"--host", "0.0.0.0", "--insecure"}).server.host, "0.0.0.0");
 }
 
@@ -215,6 +216,7 @@ TEST(Config, KeepsSessionsUnlessToldNotTo) {
   EXPECT_EQ(config({"--data-dir", "/var/cloth"}).server.data_dir, "/var/cloth");
   EXPECT_EQ(config({"--data-dir", "none"}).server.data_dir, std::nullopt);
   EXPECT_THAT(refusal({"--data-dir", ""}), HasSubstr("data_dir is empty"));
+  EXPECT_THAT(refusal({"--metrics", "9464"}), HasSubstr("metrics is \"9464\", not an address"));
 }
 
 TEST(Config, HelpsWithEveryFlag) {

@@ -31,7 +31,6 @@ class Context {
 
   // Prints the answer: the document for scripts, the text for people.
   void answer(const Json& document, const std::string& text);
-  void answer(const Json& document);
 
  private:
   std::unique_ptr<Connection> connection_;

@@ -201,7 +201,7 @@ std::string tensile_text(const Textile& textile) {
 void describe_stretch(const Scene& scene, std::size_t index, Plan& plan) {
   const SheetDefinition& sheet = scene.sheets[index];
   const auto [warp, weft] = self_weight_strain(sheet, scene.environment);
-  plan.stretch_costs.push_back({sheet.name, std::min(warp, weft)});
+  plan.stretch_costs.push_back({sheet.name, std::max(warp, weft)});
   if (!scene.solver.max_self_weight_strain) return;
   const double most = *scene.solver.max_self_weight_strain;
   const Textile capped = cap_stretch(sheet, scene.environment, most);

@@ -39,7 +39,7 @@ struct BendingLimit {
 // What resisting stretch costs: steps grow with the root of this strain.
 struct StretchCost {
   std::string sheet;
-  double self_weight_strain = 0;  // as given; the smaller one of warp and weft
+  double self_weight_strain = 0;  // as given; the larger one of warp and weft
 };
 
 // What a scene needs: derived once, before the run.

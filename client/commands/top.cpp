@@ -109,7 +109,7 @@ void show(Context& context, Status& status, const Look& now, const Look& before)
   if (context.json) {
     Json json = to_json(now.sessions);
     json["stats"] = to_json(now.stats);
-    return context.answer(json);
+    return context.answer(json, "");
   }
   const std::string text = server_text(now.stats, before.stats) + '\n' + sessions_text(now, before);
   if (!context.terminal.out_is_watched) return context.answer({}, text);

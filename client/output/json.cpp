@@ -3,6 +3,8 @@
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/util/json_util.h>
 
+#include <algorithm>
+
 namespace weft::client {
 namespace {
 
@@ -15,7 +17,11 @@ void make_integers_numbers(Json& object, const Descriptor& type) {
     const FieldDescriptor* field = type.FindFieldByName(key);
     if (field == nullptr) continue;
     if (field->cpp_type() == FieldDescriptor::CPPTYPE_INT64) {
-      value = std::stoll(value.get<std::string>());
+      const auto to_number = [](Json& text) { text = std::stoll(text.get<std::string>()); };
+      if (field->is_repeated())
+        std::for_each(value.begin(), value.end(), to_number);
+      else
+        to_number(value);
     } else if (field->is_repeated() && field->message_type() != nullptr) {
       for (auto& element : value) make_integers_numbers(element, *field->message_type());
     } else if (value.is_object()) {

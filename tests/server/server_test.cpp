@@ -77,15 +77,15 @@ TEST(Server, StopsWithAStepUnderWay) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(60));
 }
 
-// Large scenes take seconds to plan, one frame of a small one takes none.
+// Large scenes take a while to plan, one frame of a small one takes none.
 class WhileScenesArePlanned : public ::testing::Test {
  protected:
-  static constexpr int kScenes = 6;
+  static constexpr int kScenes = 4;
 
   WhileScenesArePlanned() {
     v1::Scene large = small_scene();
-    large.mutable_sheets(0)->mutable_grid()->set_rows(200);
-    large.mutable_sheets(0)->mutable_grid()->set_columns(200);
+    large.mutable_sheets(0)->mutable_grid()->set_rows(100);
+    large.mutable_sheets(0)->mutable_grid()->set_columns(100);
     for (int i = 0; i < kScenes; ++i)
       creations_.push_back(std::async(std::launch::async, [this, large] {
         const Error error = service_.create_error(large);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace weft {
 namespace {
@@ -62,26 +61,20 @@ Contacts::Contacts(std::span<const Collider> colliders, double friction, double 
   for (const Collider& collider : colliders) {
     const Vector3d offset = offset_at(collider.path, time);
     const Vector3d carried = offset - offset_at(collider.path, time - dt);
-    placed_.push_back({collider, offset, carried, std::sqrt(friction * collider.friction)});
+    const auto* box = std::get_if<Box>(&collider.shape);
+    placed_.push_back({collider,
+                       box != nullptr ? box->rotation.normalized().toRotationMatrix()
+                                      : Eigen::Matrix3d::Identity().eval(),
+                       offset, carried, std::sqrt(friction * collider.friction)});
     reach_ = std::max(reach_, carried.norm());
   }
 }
 
-double Contacts::gap(const Vector3d& point) const {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const Placed& placed : placed_)
-    nearest = std::min(nearest, distance_at(placed.collider, placed.offset, point).value);
-  return nearest - skin_;
-}
-
 bool Contacts::resolve(Vector3d& x, Vector3d& d) const {
-  // a body may push a particle into another one: rounds go on until one moves it no further
-  constexpr int kRounds = 32;
-  constexpr double kNothing = 1e-12;  // m
   bool touched = false;
   for (int round = 0; round < kRounds; ++round) {
     double deepest = 0;
-    for (const auto& [collider, offset, carried, mu] : placed_) {
+    for (const auto& [collider, turn, offset, carried, mu] : placed_) {
       const auto [value, normal] = distance_at(collider, offset, x);
       if (!(value < skin_)) continue;
       touched = true;

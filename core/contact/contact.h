@@ -27,8 +27,20 @@ class Contacts {
   Contacts(std::span<const Collider> colliders, double friction, double skin, double time,
            double dt);
 
-  // How far a point is from the nearest skin, negative within it, m.
-  double gap(const Vector3d& point) const;
+  // A collider where it is at the end of the step.
+  struct Placed {
+    const Collider& collider;
+    Eigen::Matrix3d turn;  // of a box
+    Vector3d offset;       // from its start, m
+    Vector3d carried;      // its displacement in the step, m
+    double friction;       // between it and the textile
+  };
+  std::span<const Placed> placed() const { return placed_; }
+  double skin() const { return skin_; }
+  // A body may push a particle into another one: so many rounds at most, until one moves it by no
+  // more than kNothing (m).
+  static constexpr int kRounds = 32;
+  static constexpr double kNothing = 1e-12;
   // How far the fastest collider moves in this step, m.
   double reach() const { return reach_; }
   // Moves a particle that is closer to a collider than the skin out to it, inelastically, and slows
@@ -37,12 +49,6 @@ class Contacts {
   bool resolve(Vector3d& x, Vector3d& d) const;
 
  private:
-  struct Placed {
-    const Collider& collider;
-    Vector3d offset;   // from its start, m
-    Vector3d carried;  // its displacement in the step, m
-    double friction;   // between it and the textile
-  };
   std::vector<Placed> placed_;
   double skin_, reach_ = 0;
 };

@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/motion/lattice_contact.h"
 #include "core/motion/lattice_law.h"
 #include "core/motion/sheet_solver.h"
 
@@ -76,7 +77,8 @@ class LatticeSolver : public SheetSolver {
     const auto resolve_part = [&](int part, int parts) {
       for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
         const int r = near_[static_cast<std::size_t>(i)];
-        gap_[static_cast<std::size_t>(r)] = resolve_row(contacts, r);
+        gap_[static_cast<std::size_t>(r)] =
+            resolve_row(contacts, origin_, law_.compensated, r, state_);
       }
     };
     const int parts = std::min(bands(crew), count);
@@ -153,27 +155,6 @@ class LatticeSolver : public SheetSolver {
     Eigen::Index i = 0;
     const double inverse_mass = dynamics_.inverse_mass.maxCoeff(&i);
     return dynamics_.drag[i] * inverse_mass;
-  }
-
-  // Returns how far the row's free particles are from the nearest skin, m.
-  double resolve_row(const Contacts& contacts, int r) {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (int c = 0; c < columns_; ++c) {
-      const Place at{r, c};
-      if (dynamics_.inverse_mass[r * columns_ + c] == 0) continue;
-      Vector3d x = position(at);
-      const double gap = contacts.gap(x);
-      nearest = std::min(nearest, gap);
-      if (gap >= 0) continue;
-      const Vector3d before = displacement(at);
-      Vector3d d = before;
-      contacts.resolve(x, d);
-      set_position(at, x);
-      set_displacement(at, d);
-      for (int axis = 0; axis < 3; ++axis)
-        value(State::kW + axis, at) += static_cast<T>(3 * (d[axis] - before[axis]));
-    }
-    return nearest;
   }
 
   const Dynamics& dynamics_;

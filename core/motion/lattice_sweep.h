@@ -141,6 +141,7 @@ class SweepState {
   SweepState(const LatticeLayout<T>& layout, bool compensated);
 
   int planes() const { return planes_; }
+  int vectors() const { return layout_.vectors(); }
   // Values from one vector of a row to the next.
   static constexpr std::ptrdiff_t kSeenStride = kSeen * LatticeLayout<T>::kLanes;
   std::ptrdiff_t own_stride() const { return (planes_ - kSeen) * LatticeLayout<T>::kLanes; }

@@ -1,0 +1,249 @@
+#include "core/motion/lattice_contact.h"
+
+#include <limits>
+
+// compiled again for every target
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/motion/lattice_contact.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "core/motion/lattice_vectors-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace weft::HWY_NAMESPACE {
+
+using ContactTag = hn::ScalableTag<double>;
+using Reals = hn::Vec<ContactTag>;
+using Places = Triple<Reals>;
+
+HWY_INLINE Reals real(double value) { return hn::Set(ContactTag(), value); }
+HWY_INLINE Places everywhere(const Vector3d& v) { return {real(v[0]), real(v[1]), real(v[2])}; }
+HWY_INLINE Reals dot(const Places& a, const Places& b) {
+  return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x)));
+}
+
+// Signed distances from a body, negative inside, and directions out of it.
+struct Distances {
+  Reals value;
+  Places normal;
+};
+
+HWY_INLINE Distances distances_from_ball(const Places& center, double radius, const Places& point) {
+  const Reals zero = real(0), one = real(1);
+  const Places away = minus(point, center);
+  const Reals length = hn::Sqrt(squared(away));
+  const auto apart = hn::Gt(length, zero);
+  const Places normal = times(away, hn::Div(one, length));
+  return {hn::Sub(length, real(radius)),
+          {hn::IfThenElseZero(apart, normal.x), hn::IfThenElse(apart, normal.y, one),
+           hn::IfThenElseZero(apart, normal.z)}};
+}
+
+HWY_INLINE Distances distances(const Plane& plane, const Eigen::Matrix3d&, const Places& point) {
+  const Places normal = everywhere(plane.normal.normalized());
+  return {dot(minus(point, everywhere(plane.point)), normal), normal};
+}
+
+HWY_INLINE Distances distances(const Sphere& sphere, const Eigen::Matrix3d&, const Places& point) {
+  return distances_from_ball(everywhere(sphere.center), sphere.radius, point);
+}
+
+HWY_INLINE Distances distances(const Capsule& capsule, const Eigen::Matrix3d&,
+                               const Places& point) {
+  const Vector3d axis = capsule.end - capsule.start;
+  const double squared = axis.squaredNorm();
+  const Places start = everywhere(capsule.start), along = everywhere(axis);
+  const Reals share =
+      squared > 0 ? hn::Div(dot(minus(point, start), along), real(squared)) : real(0);
+  const Reals inside = hn::Min(hn::Max(share, real(0)), real(1));
+  return distances_from_ball(plus_times(start, along, inside), capsule.radius, point);
+}
+
+// turn: of the box.
+HWY_INLINE Distances distances(const Box& box, const Eigen::Matrix3d& turn, const Places& point) {
+  const Reals zero = real(0);
+  const Places away = minus(point, everywhere(box.center));
+  const Places edge[] = {everywhere(turn.col(0)), everywhere(turn.col(1)), everywhere(turn.col(2))};
+  const Places local{dot(away, edge[0]), dot(away, edge[1]), dot(away, edge[2])};
+  const Places half = everywhere(box.half_size);
+  const Places beyond{hn::Sub(hn::Abs(local.x), half.x), hn::Sub(hn::Abs(local.y), half.y),
+                      hn::Sub(hn::Abs(local.z), half.z)};
+  const Places outside{hn::Max(beyond.x, zero), hn::Max(beyond.y, zero), hn::Max(beyond.z, zero)};
+  const Reals length = hn::Sqrt(squared(outside));
+  const auto apart = hn::Gt(length, zero);
+
+  // inside: out by the nearest face
+  const Reals inside = hn::Max(beyond.x, hn::Max(beyond.y, beyond.z));
+  const auto by_x = hn::Eq(beyond.x, inside);
+  const auto by_y = hn::AndNot(by_x, hn::Eq(beyond.y, inside));
+  const auto by_z = hn::AndNot(hn::Or(by_x, by_y), hn::Eq(beyond.z, inside));
+  const Reals one = real(1);
+  const Reals inverse = hn::Div(one, length);
+  const auto part = [&](Reals out, auto face, Reals side) HWY_ATTR {
+    const Reals size = hn::IfThenElse(apart, hn::Mul(out, inverse), hn::IfThenElseZero(face, one));
+    return hn::CopySign(size, side);
+  };
+  const Places normal = plus_times(plus_times(times(edge[0], part(outside.x, by_x, local.x)),
+                                              edge[1], part(outside.y, by_y, local.y)),
+                                   edge[2], part(outside.z, by_z, local.z));
+  return {hn::IfThenElse(apart, length, inside), normal};
+}
+
+HWY_INLINE Distances distances(const Contacts::Placed& placed, const Places& point) {
+  const Places at = minus(point, everywhere(placed.offset));
+  const auto& shape = placed.collider.shape;
+  if (const auto* plane = std::get_if<Plane>(&shape)) return distances(*plane, placed.turn, at);
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) return distances(*sphere, placed.turn, at);
+  if (const auto* box = std::get_if<Box>(&shape)) return distances(*box, placed.turn, at);
+  return distances(*std::get_if<Capsule>(&shape), placed.turn, at);
+}
+
+// See Contacts::resolve().
+template <class M>
+HWY_INLINE void resolve_places(const Contacts& contacts, M active, Places& x, Places& d) {
+  const Reals zero = real(0), skin = real(contacts.skin());
+  for (int round = 0; round < Contacts::kRounds; ++round) {
+    Reals deepest = zero;
+    for (const Contacts::Placed& placed : contacts.placed()) {
+      const auto [value, normal] = distances(placed, x);
+      const auto touching = hn::And(active, hn::Lt(value, skin));
+      const Reals depth = hn::IfThenElseZero(touching, hn::Sub(skin, value));
+      deepest = hn::Max(deepest, depth);
+      const Places relative = minus(d, everywhere(placed.carried));
+      const Reals approach = dot(relative, normal);
+
+      x = plus_times(x, normal, depth);
+      d = plus_times(d, normal, hn::Min(hn::Max(hn::Neg(approach), zero), depth));
+
+      const Places sliding = minus_times(relative, normal, approach);
+      const Reals length = hn::Sqrt(squared(sliding));
+      const Reals most = hn::Div(hn::Mul(real(placed.friction), depth), length);
+      const Reals share =
+          hn::IfThenElseZero(hn::And(touching, hn::Gt(length, zero)), hn::Min(real(1), most));
+      x = minus_times(x, sliding, share);
+      d = minus_times(d, sliding, share);
+    }
+    active = hn::And(active, hn::Gt(deepest, real(Contacts::kNothing)));
+    if (contacts.placed().size() == 1 || hn::AllFalse(ContactTag(), active)) return;
+  }
+}
+
+// Values of T read and written as double.
+template <class T>
+struct Stored {
+  static HWY_INLINE Reals load(const T* from) {
+    const hn::Rebind<T, ContactTag> d;
+    if constexpr (sizeof(T) == sizeof(double))
+      return hn::Load(d, from);
+    else
+      return hn::PromoteTo(ContactTag(), hn::Load(d, from));
+  }
+  static HWY_INLINE void store(Reals v, T* to) {
+    const hn::Rebind<T, ContactTag> d;
+    if constexpr (sizeof(T) == sizeof(double))
+      hn::Store(v, d, to);
+    else
+      hn::Store(hn::DemoteTo(d, v), d, to);
+  }
+  static HWY_INLINE Reals rounded(Reals v) {
+    const hn::Rebind<T, ContactTag> d;
+    if constexpr (sizeof(T) == sizeof(double))
+      return v;
+    else
+      return hn::PromoteTo(ContactTag(), hn::DemoteTo(d, v));
+  }
+};
+
+template <class T>
+double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                      SweepState<T>& state) {
+  using State = SweepState<T>;
+  using Of = Stored<T>;
+  constexpr int kLanes = LatticeLayout<T>::kLanes;
+  const int step = static_cast<int>(hn::Lanes(ContactTag()));
+  const Places from = everywhere(origin);
+  const Reals skin = real(contacts.skin()), far = real(std::numeric_limits<double>::infinity());
+  Reals nearest = far;
+  for (int j = 0; j < state.vectors(); ++j) {
+    for (int part = 0; part < kLanes; part += step) {
+      T* const seen = state.seen(row) + j * State::kSeenStride + part;
+      T* const own = state.own(row) + j * state.own_stride() + part;
+      const auto at = [&](int plane) HWY_ATTR {
+        return plane < State::kSeen ? seen + plane * kLanes : own + (plane - State::kSeen) * kLanes;
+      };
+      const auto exact = [&](int plane, int error) HWY_ATTR {
+        Places v{Of::load(at(plane)), Of::load(at(plane + 1)), Of::load(at(plane + 2))};
+        if (compensated)
+          v = minus(v, {Of::load(at(error)), Of::load(at(error + 1)), Of::load(at(error + 2))});
+        return v;
+      };
+
+      const auto free = hn::Gt(Of::load(at(State::kStep2)), real(0));
+      Places x = plus(from, exact(State::kX, State::kXError));
+      Reals gap = far;
+      for (const Contacts::Placed& placed : contacts.placed())
+        gap = hn::Min(gap, hn::Sub(distances(placed, x).value, skin));
+      gap = hn::IfThenElse(free, gap, far);
+      nearest = hn::Min(nearest, gap);
+      const auto touching = hn::Lt(gap, real(0));
+      if (hn::AllFalse(ContactTag(), touching)) continue;
+
+      const Places before = exact(State::kD, State::kDError);
+      Places d = before;
+      resolve_places(contacts, touching, x, d);
+
+      const auto store = [&](int plane, Reals v) HWY_ATTR {
+        Of::store(hn::IfThenElse(touching, v, Of::load(at(plane))), at(plane));
+      };
+      const auto set = [&](int plane, int error, Reals v) HWY_ATTR {
+        store(plane, v);
+        if (compensated) store(error, hn::Sub(Of::rounded(v), v));
+      };
+      const Places relative = minus(x, from);
+      set(State::kX, State::kXError, relative.x);
+      set(State::kX + 1, State::kXError + 1, relative.y);
+      set(State::kX + 2, State::kXError + 2, relative.z);
+      set(State::kD, State::kDError, d.x);
+      set(State::kD + 1, State::kDError + 1, d.y);
+      set(State::kD + 2, State::kDError + 2, d.z);
+      const Places change = times(minus(d, before), real(3));
+      store(State::kW, hn::Add(Of::load(at(State::kW)), Of::rounded(change.x)));
+      store(State::kW + 1, hn::Add(Of::load(at(State::kW + 1)), Of::rounded(change.y)));
+      store(State::kW + 2, hn::Add(Of::load(at(State::kW + 2)), Of::rounded(change.z)));
+    }
+  }
+  return hn::GetLane(hn::MinOfLanes(ContactTag(), nearest));
+}
+
+double resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                      SweepState<float>& state) {
+  return resolve_row_as(contacts, origin, compensated, row, state);
+}
+double resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                      SweepState<double>& state) {
+  return resolve_row_as(contacts, origin, compensated, row, state);
+}
+
+}  // namespace weft::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace weft {
+
+HWY_EXPORT(resolve_single);
+HWY_EXPORT(resolve_double);
+
+template <>
+double resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                   SweepState<float>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, row, state);
+}
+template <>
+double resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                   SweepState<double>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, row, state);
+}
+
+}  // namespace weft
+#endif

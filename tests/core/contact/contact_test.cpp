@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
+#include "core/motion/lattice_contact.h"
+#include "core/motion/lattice_law.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::testing {
@@ -98,6 +101,81 @@ TEST(Contact, AFastParticleInAWedgeEndsOutsideBothBodiesInEitherOrder) {
     for (const Collider& collider : colliders)
       EXPECT_GE(distance(collider, x, 1).value, 0) << collider.shape.index();
   }
+}
+
+// A lattice of which every 7th particle is held, in storage of its own.
+template <class T>
+struct Rows {
+  using State = SweepState<T>;
+  static constexpr int kRows = 6, kColumns = 37;
+  static constexpr bool kCompensated = sizeof(T) == sizeof(float);
+
+  Rows() {
+    const Matrix3Xd points = 0.5 * noise(kRows * kColumns),
+                    steps = 0.02 * noise(kRows * kColumns, 2);
+    for (int i = 0; i < kRows * kColumns; ++i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        at(State::kX + axis, i) = static_cast<T>(points(axis, i));
+        at(State::kD + axis, i) = static_cast<T>(steps(axis, i));
+        at(State::kW + axis, i) = static_cast<T>(2 * steps(axis, i));
+      }
+      at(State::kStep2, i) = i % 7 == 0 ? T(0) : T(1e-5);
+    }
+  }
+  T& at(int plane, int i) { return state.at(plane, i / kColumns, i % kColumns); }
+  Vector3d exact(int plane, int error, int i) {
+    Vector3d v;
+    for (int axis = 0; axis < 3; ++axis) {
+      v[axis] = at(plane + axis, i);
+      if (kCompensated) v[axis] -= at(error + axis, i);
+    }
+    return v;
+  }
+  Vector3d x(int i) { return origin + exact(State::kX, State::kXError, i); }
+  Vector3d d(int i) { return exact(State::kD, State::kDError, i); }
+
+  const Vector3d origin{0.2, -0.2, 0.2};
+  State state{make_sweep_law<T>(flat_sheet(kRows, kColumns)).layout, kCompensated};
+};
+
+// Single precision keeps what it rounds off, to 2^-48 of the values.
+template <class T>
+void expect_rows_like_particles(const std::vector<Collider>& colliders) {
+  const double tolerance = sizeof(T) == sizeof(float) ? 0x1p-46 : 0x1p-48;
+  const Contacts contacts(colliders, 0.4, 1e-3, 0.7, 0.1);
+  Rows<T> rows, before;
+  int touched = 0, i = 0;
+  for (int row = 0; row < rows.kRows; ++row) {
+    const double gap = resolve_row(contacts, rows.origin, rows.kCompensated, row, rows.state);
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int c = 0; c < rows.kColumns; ++c, ++i) {
+      Vector3d x = before.x(i), d = before.d(i);
+      if (i % 7 != 0) {
+        for (const Collider& collider : colliders)
+          nearest = std::min(nearest, distance(collider, x, 0.7).value - contacts.skin());
+        touched += contacts.resolve(x, d) ? 1 : 0;
+      }
+      EXPECT_LE((rows.x(i) - x).norm(), tolerance) << i;
+      EXPECT_LE((rows.d(i) - d).norm(), tolerance) << i;
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_NEAR(rows.at(rows.state.kW + axis, i),
+                    before.at(rows.state.kW + axis, i) + 3 * (d - before.d(i))[axis],
+                    4 * std::numeric_limits<T>::epsilon());
+    }
+    EXPECT_NEAR(gap, nearest, 1e-14) << row;
+  }
+  EXPECT_GT(touched, 10);
+}
+
+TEST(Contact, OfARowInVectorsIsThatOfItsParticles) {
+  std::vector<Collider> all = every_shape();
+  all[1].path = {{0, Vector3d::Zero()}, {1, Vector3d(0.05, 0, 0.1)}};
+  for (const Collider& collider : all) {
+    expect_rows_like_particles<float>({collider});
+    expect_rows_like_particles<double>({collider});
+  }
+  expect_rows_like_particles<float>(all);
+  expect_rows_like_particles<double>(all);
 }
 
 // A sheet without springs on an incline: each particle is a block of the textbook.

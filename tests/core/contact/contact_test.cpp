@@ -111,7 +111,7 @@ struct Rows {
   static constexpr bool kCompensated = sizeof(T) == sizeof(float);
 
   Rows() {
-    const Matrix3Xd points = 0.5 * noise(kRows * kColumns),
+    const Matrix3Xd points = 0.2 * noise(kRows * kColumns),
                     steps = 0.02 * noise(kRows * kColumns, 2);
     for (int i = 0; i < kRows * kColumns; ++i) {
       for (int axis = 0; axis < 3; ++axis) {

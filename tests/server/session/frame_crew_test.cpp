@@ -32,7 +32,7 @@ std::unique_ptr<FrameCrew> full_crew(Scheduler& scheduler, int hands) {
 TEST(FrameCrew, RunsEveryPartOnce) {
   Scheduler scheduler(3);
   const auto crew = full_crew(scheduler, 4);
-  for (int round = 0; round < 2000; ++round) {
+  for (int round = 0; round < 500; ++round) {
     std::vector<int> runs(8);
     crew->run(8, [&](int part) { ++runs[static_cast<std::size_t>(part)]; });
     ASSERT_THAT(runs, ::testing::Each(1)) << round;

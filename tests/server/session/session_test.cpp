@@ -298,18 +298,20 @@ TEST(Session, RepairsAFaultInTheMiddleOfARunAndTellsOfIt) {
 
 TEST(Session, FailsWhenRepairsAreUsedUpWithItsLastGoodFrameReadable) {
   Scheduler scheduler(2);
+  Scene scene = hung_scene();
+  scene.solver.max_repairs = 8;
   const auto session = std::make_shared<Session>(
       make_identity("test", "test"),
-      Simulation(hung_scene(), faulty_solvers({.frame = 7, .times = 1000, .jump = 1e300})),
+      Simulation(scene, faulty_solvers({.frame = 7, .times = 1000, .jump = 1e300})),
       SessionHost{scheduler, stats(), kMuchHistory}, std::make_unique<NoLog>());
   const auto watcher = Watcher::of(*session, 1);
   EXPECT_EQ(step(*session, 20).refused(), Refusal::Why::kFailed);
   const SessionStatus status = session->status();
   EXPECT_EQ(status.state, SessionState::kFailed);
   EXPECT_EQ(status.newest->number, 6);
-  EXPECT_EQ(status.repairs.size(), 12u);
+  EXPECT_EQ(status.repairs.size(), 8u);
   EXPECT_THAT(status.failure, ::testing::HasSubstr("frame 7"));
-  EXPECT_THAT(status.failure, ::testing::HasSubstr("after 12 halvings"));
+  EXPECT_THAT(status.failure, ::testing::HasSubstr("after 8 halvings"));
   finite_frames(*watcher, 6);
   EXPECT_EQ(watcher->read().kind, Reading::Kind::kFailed);
 }

@@ -57,14 +57,14 @@ void add_export(CLI::App& app, Context& context) {
   auto* frames =
       command->add_option("--frames", options->frames, "Frames A to B; either may be left out")
           ->option_text("A:B");
-  command->add_option("--every", order.every, "Of the frames each Nth only")
-      ->option_text("N")
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000}));
+  auto* every = command->add_option("--every", order.every, "Of the frames each Nth only")
+                    ->option_text("N")
+                    ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000}));
   command->add_option("--times", order.times_s, "Frames at these simulated times instead, s")
       ->option_text("S,S,...")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->excludes(frames);
+      ->excludes(frames, every);
   command->callback([&context, options] { run_export(context, *options); });
 }
 

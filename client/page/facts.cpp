@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -46,10 +45,10 @@ Rows sheet_rows(const v1::Sheet& sheet) {
   if (textile.has_measured()) {
     const v1::MeasuredTextile& values = textile.measured();
     rows.emplace_back("areal density", value_text(values.areal_density_kg_per_m2(), "kg/m²"));
-    rows.emplace_back("tensile, warp and weft", pair_text(values.tensile_warp_n_per_m(),
-                                                          values.tensile_weft_n_per_m(), "N/m"));
+    rows.emplace_back("tensile, warp, weft", pair_text(values.tensile_warp_n_per_m(),
+                                                       values.tensile_weft_n_per_m(), "N/m"));
     rows.emplace_back("shear", value_text(values.shear_n_per_m(), "N/m"));
-    rows.emplace_back("bending, warp and weft",
+    rows.emplace_back("bending, warp, weft",
                       pair_text(1e6 * values.bend_rigidity_warp_n_m(),
                                 1e6 * values.bend_rigidity_weft_n_m(), "µN m"));
     rows.emplace_back("air drag", value_text(values.air_drag_kg_per_m2_s(), "kg/(m² s)"));
@@ -68,29 +67,25 @@ Rows sheet_rows(const v1::Sheet& sheet) {
   return rows;
 }
 
-// "2026-11-21 06:52:11 UTC" of "2026-11-21T06:52:11Z"
-std::string recorded_text(std::string time) {
-  std::replace(time.begin(), time.end(), 'T', ' ');
-  if (time.ends_with('Z')) time.replace(time.size() - 1, 1, " UTC");
-  return time;
+// "2026-11-21 06:52 UTC" of "2026-11-21T06:52:11Z"
+std::string minute_text(const std::string& time) {
+  if (time.size() < 16) return time;
+  return time.substr(0, 10) + ' ' + time.substr(11, 5) + " UTC";
 }
 
 Rows run_rows(const RecordingReader& recording, const Tally& tally) {
   const v1::FrameStats& end = tally.last_stats;
-  Rows rows{
-      {"recorded", recorded_text(recording.recorded_at())},
-      {"session", recording.header().session()},
-      {"numerics", recording.header().numerics_id()},
-      {"frames", fmt::format("{} ({} to {})", tally.frames, tally.first_frame, tally.last_frame)},
-      {"frame step", seconds_text(recording.header().frame_step_s())},
-      {"simulated time",
-       fmt::format("{:.6g} s to {:.6g} s", tally.first_time_s, tally.last_time_s)}};
+  Rows rows{{"recorded", minute_text(recording.recorded_at())},
+            {"numerics", recording.header().numerics_id()},
+            {"frames", std::to_string(tally.frames)},
+            {"frame step", seconds_text(recording.header().frame_step_s())},
+            {"simulated until", fmt::format("{:.6g} s", tally.last_time_s)}};
   if (!recording.header().format().stats()) return rows;
   rows.emplace_back("substeps", std::to_string(tally.substeps));
-  rows.emplace_back("a substep, at the end", seconds_text(end.substep_s()));
+  rows.emplace_back("substep at the end", seconds_text(end.substep_s()));
   rows.emplace_back("largest strain", percent_text(tally.largest_strain));
   rows.emplace_back("repairs", tally.repairs == 0 ? "none" : std::to_string(tally.repairs));
-  rows.emplace_back("at rest, at the end", end.at_rest() ? "yes" : "no");
+  rows.emplace_back("at rest at the end", end.at_rest() ? "yes" : "no");
   return rows;
 }
 

@@ -227,7 +227,7 @@ class Pane {
     this.sun.position.copy(centre).addScaledVector(new THREE.Vector3(-0.9, 1.1, 1.2).addScaledVector(up, 1.6), radius);
     this.sun.target.position.copy(centre);
     this.sun.castShadow = true;
-    this.sun.shadow.mapSize.set(2048, 2048);
+    this.sun.shadow.mapSize.set(1024, 1024);
     this.sun.shadow.bias = -0.0015;
     this.sun.shadow.radius = 3;
     Object.assign(this.sun.shadow.camera,
@@ -268,11 +268,11 @@ class Pane {
       return made;
     };
     const surface = geometry(cells);
-    const options = {roughness: 0.85, metalness: 0, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1};
+    const options = {polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1};
     this.faces = [THREE.FrontSide, THREE.BackSide].map((side) => ({
-      plain: new THREE.MeshStandardMaterial({...options, side, shadowSide: THREE.DoubleSide}),
-      coloured: new THREE.MeshStandardMaterial(
-        {...options, side, shadowSide: THREE.DoubleSide, vertexColors: THREE.VertexColors, roughness: 1}),
+      plain: new THREE.MeshLambertMaterial({...options, side, shadowSide: THREE.DoubleSide}),
+      coloured: new THREE.MeshLambertMaterial(
+        {...options, side, shadowSide: THREE.DoubleSide, vertexColors: THREE.VertexColors}),
     }));
     this.cloth = new THREE.Group();
     this.cloth.position.set(...origin_m);
@@ -281,7 +281,8 @@ class Pane {
       mesh.castShadow = mesh.receiveShadow = true;
       this.cloth.add(mesh);
     }
-    this.lattice = new THREE.LineSegments(geometry(threads), new THREE.LineBasicMaterial({transparent: true, opacity: 0.25}));
+    this.lattice = new THREE.LineSegments(geometry(threads),
+      new THREE.LineBasicMaterial({transparent: true, opacity: 0.25}));
     this.lattice.visible = false;
     this.pins = new THREE.Points(geometry(pins), new THREE.PointsMaterial({size: 7, sizeAttenuation: false}));
     this.cloth.add(this.lattice, this.pins);
@@ -291,7 +292,7 @@ class Pane {
 
   addBodies(centre, radius) {
     // drawn a little behind its place, so that cloth that lies on it hides it
-    this.bodyMaterial = new THREE.MeshStandardMaterial({roughness: 0.7, metalness: 0, side: THREE.DoubleSide,
+    this.bodyMaterial = new THREE.MeshLambertMaterial({side: THREE.DoubleSide,
       polygonOffset: true, polygonOffsetFactor: 4, polygonOffsetUnits: 4});
     this.bodies = this.recording.colliders.map((collider) => {
       const mesh = colliderMesh(collider, this.bodyMaterial, centre, 2.5 * radius);
@@ -313,7 +314,8 @@ class Pane {
     const lowest = Math.min(...cornersOf(box).map((corner) => corner.sub(centre).dot(up)));
     const floor = centre.clone().addScaledVector(up, lowest);
     this.grid.position.copy(floor);
-    this.shade = new THREE.Mesh(new THREE.CircleBufferGeometry(0.75 * size, 64), new THREE.ShadowMaterial({opacity: 0.22}));
+    this.shade = new THREE.Mesh(new THREE.CircleBufferGeometry(0.75 * size, 64),
+      new THREE.ShadowMaterial({opacity: 0.22}));
     this.shade.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), up);
     this.shade.position.copy(floor).addScaledVector(up, -1e-3 * size);
     this.shade.receiveShadow = true;
@@ -400,7 +402,8 @@ class Viewer {
     this.playing = false;
     this.quantity = '';
     this.stale = true;
-    new ResizeObserver(() => { this.stale = true; }).observe($('stage'));
+    this.fitted = true;  // nobody has turned the view yet
+    new ResizeObserver(() => this.resize()).observe($('stage'));
   }
 
   async open(figure) {
@@ -432,9 +435,9 @@ class Viewer {
     const times = recordings.flatMap(({time_s}) => time_s).sort((a, b) => a - b);
     this.ticks = times.filter((t, k) => k === 0 || t - times[k - 1] > kSameTime);
     $('scrub').max = this.ticks.length - 1;
-    this.makeCamera();
     this.layOut(recordings);
     showFacts(figure, recordings, this.panes[0].gridCell);
+    this.makeCamera();
     this.goTo(this.ticks[0]);
   }
 
@@ -446,6 +449,7 @@ class Viewer {
     this.controls.enableKeys = false;
     this.controls.screenSpacePanning = true;
     this.controls.addEventListener('change', () => { this.stale = true; });
+    this.controls.addEventListener('start', () => { this.fitted = false; });
     this.fit();
   }
 
@@ -473,6 +477,12 @@ class Viewer {
     this.controls.maxDistance = 30 * radius;
     this.controls.minDistance = radius / 50;
     this.controls.update();
+    this.fitted = true;
+    this.stale = true;
+  }
+
+  resize() {
+    if (this.fitted && this.panes.length > 0) this.fit();
     this.stale = true;
   }
 
@@ -484,20 +494,21 @@ class Viewer {
     if (Math.abs(offset.clone().normalize().dot(this.up)) > 0.999) return;
     this.camera.position.copy(this.controls.target).add(offset);
     this.controls.update();
+    this.fitted = false;
     this.stale = true;
   }
 
-  // Panes side by side or in a grid, of the shape that is nearest to a square.
+  // The grid of panes whose shorter side is longest.
   split() {
     const {clientWidth, clientHeight} = $('stage');
     const count = Math.max(1, this.panes.length);
-    let best = {columns: 1, rows: count};
-    const badness = ({columns, rows}) => Math.abs(Math.log(clientWidth / columns / (clientHeight / rows)));
+    let best;
     for (let columns = 1; columns <= count; ++columns) {
-      const shape = {columns, rows: Math.ceil(count / columns)};
-      if (columns * shape.rows - count < columns && badness(shape) < badness(best)) best = shape;
+      const rows = Math.ceil(count / columns);
+      const shape = {columns, rows, width: clientWidth / columns, height: clientHeight / rows};
+      if (!best || Math.min(shape.width, shape.height) > Math.min(best.width, best.height)) best = shape;
     }
-    return {...best, width: clientWidth / best.columns, height: clientHeight / best.rows};
+    return best;
   }
 
   layOut(recordings) {
@@ -577,7 +588,9 @@ class Viewer {
     let most = 0;
     if (this.quantity) {
       for (const {recording, values} of this.panes) {
-        most = Math.max(most, $('now').checked ? values.reduce((a, b) => Math.max(a, b), 0) : recording.largest(this.quantity));
+        const largest = $('now').checked ? values.reduce((a, b) => Math.max(a, b), 0)
+          : recording.largest(this.quantity);
+        most = Math.max(most, largest);
       }
       $('quantity').textContent = kQuantities[this.quantity].title;
       $('most').textContent = kQuantities[this.quantity].text(most);
@@ -626,9 +639,10 @@ const kCurrent = [
 ];
 let currentCells = [];
 
+// A last short word, such as a unit, stays with the one before it.
 function cell(tag, text, attributes = {}) {
   const made = document.createElement(tag);
-  made.textContent = text;
+  made.textContent = text.replace(/ (?=[^ ]{1,6}$)/, '\u00a0');
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
   return made;
 }
@@ -662,8 +676,8 @@ function showFacts(figure, recordings, gridCell) {
       for (const [label] of rows) groups.get(name).add(label);
     }
   }
-  const find = (recording, name, label) =>
-    recording.facts.filter((facts) => facts.group === name).flatMap(({rows}) => rows).find(([known]) => known === label)?.[1] ?? '';
+  const find = ({facts}, name, label) => facts.filter(({group: known}) => known === name)
+    .flatMap(({rows}) => rows).find(([known]) => known === label)?.[1] ?? '';
   for (const [name, labels] of groups) {
     group(name);
     for (const label of labels) {
@@ -692,9 +706,12 @@ function showTime(viewer) {
   $('clock').textContent = clock;
   $('scrub').setAttribute('aria-valuetext', clock);
   viewer.panes.forEach(({recording, frame}, pane) => {
-    kCurrent.forEach(([, text], k) => { currentCells[k][pane].textContent = text(recording, frame) ?? 'not recorded'; });
-    const stats = recording.stats && `, strain up to ${(100 * recording.stats.largest_strain[frame]).toPrecision(3)} %`;
-    $('names').children[pane].lastChild.textContent = `frame ${recording.first_frame + frame}${stats ?? ''}`;
+    kCurrent.forEach(([, text], k) => {
+      currentCells[k][pane].textContent = (text(recording, frame) ?? 'not recorded').replaceAll(' ', '\u00a0');
+    });
+    const strain = recording.stats && (100 * recording.stats.largest_strain[frame]).toPrecision(3);
+    $('names').children[pane].lastChild.textContent = `frame ${recording.first_frame + frame}` +
+      (strain ? `, strain up to ${strain}\u00a0%` : '');
   });
 }
 
@@ -757,6 +774,7 @@ function listen(viewer) {
 
   const keys = {
     ' ': toggle, Home: start, End: end,
+    ArrowLeft: (frames) => viewer.step(-frames), ArrowRight: (frames) => viewer.step(frames),
     f: () => viewer.fit(), l: () => toggleLattice(viewer), t: theme, c: nextColour,
     w: () => viewer.turn(0, -0.1), s: () => viewer.turn(0, 0.1),
     a: () => viewer.turn(-0.1, 0), d: () => viewer.turn(0.1, 0),
@@ -765,12 +783,10 @@ function listen(viewer) {
   document.addEventListener('keydown', (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches('select')) return;
     if (event.key === ' ' && event.target.matches('button, input, summary')) return;
-    const by = event.shiftKey ? 10 : 1;
-    const action = event.key === 'ArrowLeft' ? () => viewer.step(-by)
-      : event.key === 'ArrowRight' ? () => viewer.step(by) : keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    const action = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!action) return;
     event.preventDefault();
-    action();
+    action(event.shiftKey ? 10 : 1);
   });
 }
 

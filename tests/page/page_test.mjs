@@ -51,6 +51,7 @@ async function open(name, options = {}) {
 const settle = (page) => page.evaluate(() => new Promise((done) =>
   requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
 const picture = (page, name) => page.screenshot({path: join(process.env.PICTURES, `${name}.png`)});
+const plain = (text) => text.replaceAll('\u00a0', ' ');
 const clock = (page) => page.textContent('#clock');
 // What the canvas shows, to be compared.
 const canvas = async (page) => createHash('sha256').update(await page.locator('#view').screenshot()).digest('hex');
@@ -58,7 +59,7 @@ const canvas = async (page) => createHash('sha256').update(await page.locator('#
 test('one recording is shown with its facts', async () => {
   const {page, close} = await open('one.html');
   assert.equal(await clock(page), '0.000 / 4.000 s');
-  const facts = await page.textContent('#facts');
+  const facts = plain(await page.textContent('#facts'));
   for (const fact of ['31 x 31', '33.33 mm', '3e-05 N m²', '2000 N/m', '32 line segments']) assert.ok(facts.includes(fact), fact);
   assert.match(await page.textContent('#precision'), /within 4\.1 µm/);
   await page.keyboard.press('End');
@@ -121,7 +122,7 @@ test('two recordings stand side by side in step, with what differs in bold', asy
   const names = await page.locator('#names div').allTextContents();
   assert.match(names[0], /^limpframe 40, strain up to /);
   assert.match(names[1], /^stiffframe 40, strain up to /);
-  assert.deepEqual(await page.locator('tr.differs th').filter({hasText: 'k_b'}).allTextContents(), ['k_b, bend']);
+  assert.deepEqual(await page.locator('tr.differs th').filter({hasText: 'k_b'}).allTextContents(), ['k_b,\u00a0bend']);
   await picture(page, 'pair');
   await page.locator('#colour').selectOption('strain');
   await page.getByRole('button', {name: 'Theme'}).click();

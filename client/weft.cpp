@@ -74,6 +74,8 @@ void add_commands(CLI::App& app, Context& context) {
   add_verify(app, context);
   add_diff(app, context);
   add_export(app, context);
+  add_plot(app, context);
+  add_view(app, context);
   add_script(app, context);
   add_health(app, context);
   add_demo(app, context);

@@ -9,6 +9,7 @@
 #include "client/exports/export.h"
 #include "client/output/status.h"
 #include "client/output/text.h"
+#include "client/page/page.h"
 #include "client/recording/recorder.h"
 #include "client/templates/templates.h"
 
@@ -32,20 +33,53 @@ struct Run {
 
 std::vector<Run> plan_runs(const DemoOptions& options) {
   std::vector<Run> runs;
-  const auto add = [&](const char* experiment, std::optional<double> bend) {
-    TemplateOptions values;
-    values.bend = bend;
+  const auto add = [&](const char* experiment, const std::string& variant,
+                       const TemplateOptions& values) {
     Run run;
-    run.name = experiment + (bend ? fmt::format("-kb-{:g}", *bend) : "");
+    run.name = experiment + variant;
     run.scene = make_template(experiment, values);
     run.path = (std::filesystem::path(options.directory) / run.name).string();
     run.last_frame = std::llround(options.longest_time_s / run.scene.solver().frame_step_s());
     runs.push_back(run);
   };
-  add("paper-1", std::nullopt);
-  for (const double bend : {0.0, 0.1}) add("paper-2", bend);
-  for (const double bend : {0.0, 0.1, 0.2, 0.3}) add("paper-3", bend);
+  add("paper-1", "", {});
+  for (const double bend : {0.0, 0.1})
+    add("paper-2", fmt::format("-kb-{:g}", bend), {.bend = bend});
+  for (const double bend : {0.0, 0.1, 0.2, 0.3})
+    add("paper-3", fmt::format("-kb-{:g}", bend), {.bend = bend});
+  for (const int segments : {2, 5, 60})
+    add("paper-4", fmt::format("-{}", segments), {.segments = segments, .fold_clamp = true});
+  add("paper-4", "-exact", {.evaluator = v1::EVALUATOR_EXACT});
   return runs;
+}
+
+// The paper's figures, from the recordings of the runs.
+PageOrder plan_page(const DemoOptions& options) {
+  const std::filesystem::path directory = options.directory;
+  const auto exhibit = [&](const std::string& name, const std::string& run) {
+    return Exhibit{name, (directory / (run + ".weft")).string()};
+  };
+  return {
+      .path = (directory / "figures.html").string(),
+      .title = "The paper's figures 4 to 7 by Weft",
+      .figures = {
+          {.title = "Figure 4",
+           .caption = "Experiment 1: a cloth hung from two corners falls from level to rest.",
+           .exhibits = {exhibit("k_b 0.1", "paper-1")}},
+          {.title = "Figure 5",
+           .caption = "Experiment 2: a cloth falls on a box. The stiffer one resists at the "
+                      "corners of the box.",
+           .exhibits = {exhibit("k_b 0", "paper-2-kb-0"), exhibit("k_b 0.1", "paper-2-kb-0.1")}},
+          {.title = "Figure 6",
+           .caption = "Experiment 3: a cloth falls on a sphere, with three stiffnesses. The "
+                      "edges differ.",
+           .exhibits = {exhibit("k_b 0", "paper-3-kb-0"), exhibit("k_b 0.1", "paper-3-kb-0.1"),
+                        exhibit("k_b 0.3", "paper-3-kb-0.3")}},
+          {.title = "Figure 7",
+           .caption = "Experiment 4: the same cloth, k_b 0.1, with its clamped bending function "
+                      "(eq. 5) in 2, 5 and 60 line segments, and exact.",
+           .exhibits = {exhibit("2 segments", "paper-4-2"), exhibit("5 segments", "paper-4-5"),
+                        exhibit("60 segments", "paper-4-60"), exhibit("exact", "paper-4-exact")}}}};
 }
 
 // All frames as a point cache, the last one as a mesh.
@@ -114,7 +148,8 @@ double energy(const Run& run) {
   return run.tally.last_stats.kinetic_energy_j() + run.tally.last_stats.potential_energy_j();
 }
 
-std::string table_text(const std::vector<Run>& runs, const std::string& directory) {
+std::string table_text(const std::vector<Run>& runs, const std::string& directory,
+                       const std::string& page) {
   Table table({"EXPERIMENT", "WALL", "SIMULATED", "STEPS", "STRAIN", "AT REST", "RECORDING"});
   for (const Run& run : runs) {
     table.add({run.name, fmt::format("{:.1f} s", run.wall.count()),
@@ -126,11 +161,12 @@ std::string table_text(const std::vector<Run>& runs, const std::string& director
   }
   return fmt::format(
       "{}\nAll in {}; beside each recording .pc2, its frames as a point cache, and\n"
-      "-end, the last one as OBJ. STRAIN: the largest. AT REST: the energy.\n",
-      table.text(), directory);
+      "-end, the last one as OBJ. STRAIN: the largest. AT REST: the energy.\n"
+      "The paper's figures 4 to 7, to be played and turned in a browser:\n  {}\n",
+      table.text(), directory, page);
 }
 
-Json runs_json(const std::vector<Run>& runs) {
+Json runs_json(const std::vector<Run>& runs, const std::string& page) {
   Json json = Json::array();
   for (const Run& run : runs) {
     json.push_back({{"experiment", run.name},
@@ -142,7 +178,7 @@ Json runs_json(const std::vector<Run>& runs) {
                     {"at_rest", run.tally.last_stats.at_rest()},
                     {"file", run.path + ".weft"}});
   }
-  return {{"runs", std::move(json)}};
+  return {{"runs", std::move(json)}, {"page", page}};
 }
 
 void run_demo(Context& context, const DemoOptions& options) {
@@ -152,15 +188,18 @@ void run_demo(Context& context, const DemoOptions& options) {
   if (error) throw unwritable(options.directory, error.message());
   std::vector<Run> runs = plan_runs(options);
   perform_all(context, runs);
-  context.answer(runs_json(runs), table_text(runs, options.directory));
+  const PageOrder page = plan_page(options);
+  write_page(page, [](const std::string&) {});
+  const std::string path = std::filesystem::absolute(page.path).string();
+  context.answer(runs_json(runs, path), table_text(runs, options.directory, path));
 }
 
 }  // namespace
 
 void add_demo(CLI::App& app, Context& context) {
   auto options = std::make_shared<DemoOptions>();
-  CLI::App* command = app.add_subcommand(
-      "demo", "Run the paper's experiments 1 to 3 on a server within this command");
+  CLI::App* command =
+      app.add_subcommand("demo", "Run the paper's experiments on a server within this command");
   command->add_option("-o,--output", options->directory, "Directory for recordings and exports")
       ->type_name("DIR")
       ->capture_default_str();

@@ -34,7 +34,8 @@ void run_export(Context& context, const ExportOptions& options) {
 
 void add_export(CLI::App& app, Context& context) {
   const std::map<std::string, ExportFormat> formats{
-      {"obj", ExportFormat::kObj}, {"pc2", ExportFormat::kPc2}, {"csv", ExportFormat::kCsv}};
+      {"obj", ExportFormat::kObj},   {"pc2", ExportFormat::kPc2}, {"mdd", ExportFormat::kMdd},
+      {"gltf", ExportFormat::kGltf}, {"vtk", ExportFormat::kVtk}, {"csv", ExportFormat::kCsv}};
   auto options = std::make_shared<ExportOptions>();
   ExportOrder& order = options->order;
   CLI::App* command =
@@ -42,10 +43,12 @@ void add_export(CLI::App& app, Context& context) {
   command->add_option("FILE", options->recording, "Recording")->option_text(" ")->required();
   command
       ->add_option("-f,--format", order.format,
-                   "obj: a directory of meshes; pc2: point cache; csv: a row for every frame")
+                   "obj: a directory of meshes\npc2, mdd: point caches\n"
+                   "gltf: an animated mesh, .glb\nvtk: a collection of meshes, .pvd\n"
+                   "csv: a row for every frame")
       ->required()
       ->transform(CLI::CheckedTransformer(formats))
-      ->option_text("obj|pc2|csv, REQUIRED");
+      ->option_text("obj|pc2|mdd|gltf|vtk|csv, REQUIRED");
   command->add_option("-o,--output", order.path, "File to write; for obj a directory")
       ->type_name("PATH")
       ->required();
@@ -54,11 +57,14 @@ void add_export(CLI::App& app, Context& context) {
   auto* frames =
       command->add_option("--frames", options->frames, "Frames A to B; either may be left out")
           ->option_text("A:B");
+  auto* every = command->add_option("--every", order.every, "Of the frames each Nth only")
+                    ->option_text("N")
+                    ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000}));
   command->add_option("--times", order.times_s, "Frames at these simulated times instead, s")
       ->option_text("S,S,...")
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->excludes(frames);
+      ->excludes(frames, every);
   command->callback([&context, options] { run_export(context, *options); });
 }
 

@@ -61,18 +61,24 @@ std::vector<std::int64_t> frames_to_export(RecordingReader& recording, const Exp
   for (const double time : order.times_s) numbers.push_back(find_frame_at(recording, time));
   if (!order.times_s.empty()) return numbers;
   const std::int64_t last = std::min(order.frames.last, recording.last_frame());
-  for (auto n = std::max(order.frames.first, recording.first_frame()); n <= last; ++n)
+  for (auto n = std::max(order.frames.first, recording.first_frame()); n <= last; n += order.every)
     numbers.push_back(n);
   return numbers;
 }
 
 std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& part,
-                                         std::int64_t first_frame) {
+                                         const std::vector<std::int64_t>& numbers) {
   switch (order.format) {
     case ExportFormat::kObj:
       return make_obj_writer(order.path, part.sheets);
     case ExportFormat::kPc2:
-      return make_pc2_writer(order.path, part.count, first_frame);
+      return make_pc2_writer(order.path, part.count, numbers.front());
+    case ExportFormat::kMdd:
+      return make_mdd_writer(order.path, part.count, numbers.size());
+    case ExportFormat::kGltf:
+      return make_gltf_writer(order.path, part.sheets, part.count, numbers.size());
+    case ExportFormat::kVtk:
+      return make_vtk_writer(order.path, part.sheets);
     case ExportFormat::kCsv:
       return make_csv_writer(order.path, part.count);
   }
@@ -91,7 +97,7 @@ ExportResult export_recording(RecordingReader& recording, const ExportOrder& ord
   std::error_code error;  // there is no such file yet
   if (std::filesystem::equivalent(order.path, recording.path(), error))
     throw unwritable(order.path, "it is the recording itself");
-  const auto writer = make_writer(order, part, numbers.front());
+  const auto writer = make_writer(order, part, numbers);
   ExportResult result{.frames = 0, .particles = static_cast<std::int64_t>(part.count)};
   for (const std::int64_t number : numbers) {
     const v1::Frame frame = recording.read(number);

@@ -10,7 +10,7 @@
 
 namespace weft::client {
 
-enum class ExportFormat { kObj, kPc2, kCsv };
+enum class ExportFormat { kObj, kPc2, kMdd, kGltf, kVtk, kCsv };
 
 // What is exported, and where to.
 struct ExportOrder {
@@ -18,6 +18,7 @@ struct ExportOrder {
   std::string path;
   std::string sheet;  // empty: all sheets
   FrameRange frames;
+  std::int64_t every = 1;       // each such frame of them
   std::vector<double> times_s;  // where given, frames at these times instead
 };
 

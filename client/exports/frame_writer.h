@@ -36,4 +36,18 @@ std::unique_ptr<FrameWriter> make_pc2_writer(const std::string& path, std::size_
 std::unique_ptr<FrameWriter> make_obj_writer(const std::string& directory,
                                              std::vector<v1::SheetLayout> sheets);
 
+// Point cache of LightWave, Blender and Marvelous Designer, float32.
+std::unique_ptr<FrameWriter> make_mdd_writer(const std::string& path, std::size_t particles,
+                                             std::size_t frames);
+
+// Binary glTF 2.0: the cells as triangles with normals, the first frame as the mesh, the others as
+// morph targets of an animation.
+std::unique_ptr<FrameWriter> make_gltf_writer(const std::string& path,
+                                              const std::vector<v1::SheetLayout>& sheets,
+                                              std::size_t particles, std::size_t frames);
+
+// ParaView's collection x.pvd, and a directory x of meshes frame_000123.vtp, float64.
+std::unique_ptr<FrameWriter> make_vtk_writer(const std::string& path,
+                                             const std::vector<v1::SheetLayout>& sheets);
+
 }  // namespace weft::client

@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "client/exports/frame_writer.h"
+#include "client/exports/mesh.h"
 #include "client/exports/output_file.h"
 #include "client/problem.h"
 
@@ -18,16 +19,10 @@ void add_vertices(std::string& text, const Points& points, std::size_t first, st
   }
 }
 
-// Quads, seen from above a flat sheet anticlockwise; OBJ counts vertices from 1.
+// OBJ counts vertices from 1.
 void add_quads(std::string& text, const v1::SheetLayout& sheet) {
-  for (int row = 0; row + 1 < sheet.rows(); ++row) {
-    for (int column = 0; column + 1 < sheet.columns(); ++column) {
-      const int corner = sheet.first_particle() + row * sheet.columns() + column + 1;
-      const int below = corner + sheet.columns();
-      fmt::format_to(std::back_inserter(text), "f {} {} {} {}\n", corner, below, below + 1,
-                     corner + 1);
-    }
-  }
+  for (const auto& [a, b, c, d] : quads_of(sheet))
+    fmt::format_to(std::back_inserter(text), "f {} {} {} {}\n", a + 1, b + 1, c + 1, d + 1);
 }
 
 class ObjWriter : public FrameWriter {

@@ -3,8 +3,15 @@
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace weft::client {
+
+// Numbers as they are in memory: little-endian.
+template <class Number>
+std::string_view bytes_of(const std::vector<Number>& numbers) {
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
+}
 
 // A file that is written; what fails is a Problem.
 class OutputFile {

@@ -34,7 +34,7 @@ class Pc2Writer : public FrameWriter {
       values.insert(values.end(),
                     {static_cast<float>(x[i]), static_cast<float>(y[i]), static_cast<float>(z[i])});
     }
-    file_.write({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float)});
+    file_.write(bytes_of(values));
     ++header_.samples;
   }
 

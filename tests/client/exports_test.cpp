@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cstring>
+#include <pugixml.hpp>
 #include <sstream>
 
 #include "client/recording/reader.h"
@@ -169,6 +171,116 @@ TEST_F(ExportsTest, ObjIsAMeshOfQuadsForEveryFrame) {
   EXPECT_THAT(names, ::testing::ElementsAre("left", "right"));
   EXPECT_EQ(vertices, kParticles);
   EXPECT_EQ(quads, 3 * 4 + 2 * 5);
+}
+
+// A number of a big-endian file.
+template <class Number>
+Number big_endian_at(std::string bytes, std::size_t place) {
+  bytes = bytes.substr(place, sizeof(Number));
+  std::reverse(bytes.begin(), bytes.end());
+  return number_at<Number>(bytes, 0);
+}
+
+TEST_F(ExportsTest, MddIsAPointCacheWithTimes) {
+  ask({"export", file_, "--format", "mdd", "--every", "5", "-o", path("cloth.mdd")});
+  const std::string bytes = read_file(path("cloth.mdd"));
+  ASSERT_EQ(big_endian_at<std::int32_t>(bytes, 0), 3);  // frames 0, 5 and 10
+  ASSERT_EQ(big_endian_at<std::int32_t>(bytes, 4), kParticles);
+  ASSERT_EQ(bytes.size(), 8 + 3 * (4 + 12 * kParticles));
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto frame = static_cast<std::int64_t>(5 * k);
+    EXPECT_FLOAT_EQ(big_endian_at<float>(bytes, 8 + 4 * k), static_cast<float>(5 * k) / 60);
+    for (std::size_t i = 0; i < 3 * kParticles; ++i) {
+      ASSERT_EQ(big_endian_at<float>(bytes, 20 + 4 * (k * 3 * kParticles + i)),
+                static_cast<float>(recorded(frame, i % 3, i / 3)));
+    }
+  }
+}
+
+// The numbers of an appended array of a .vtp file.
+template <class Number>
+std::vector<Number> vtk_array(const std::string& file, const std::string& attributes) {
+  const std::string after = "offset=\"";
+  const std::size_t offset = file.find(after, file.find(attributes)) + after.size();
+  const std::size_t place = file.find("raw\">_") + 6 + std::stoul(file.substr(offset));
+  std::vector<Number> numbers(number_at<std::uint64_t>(file, place) / sizeof(Number));
+  std::memcpy(numbers.data(), file.data() + place + 8, numbers.size() * sizeof(Number));
+  return numbers;
+}
+
+TEST_F(ExportsTest, VtkIsACollectionOfMeshes) {
+  ask({"export", file_, "--format", "vtk", "--frames", "4:", "-o", path("cloth.pvd")});
+  pugi::xml_document collection;
+  ASSERT_TRUE(collection.load_file(path("cloth.pvd").c_str()));
+  std::int64_t frame = 4;
+  for (const auto& entry : collection.child("VTKFile").child("Collection")) {
+    EXPECT_NEAR(entry.attribute("timestep").as_double(), static_cast<double>(frame) / 60, 1e-11);
+    const std::string mesh = read_file(path(entry.attribute("file").value()));
+    const auto points = vtk_array<double>(mesh, "NumberOfComponents=\"3\"");
+    ASSERT_EQ(points.size(), 3 * kParticles);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      ASSERT_EQ(points[i], recorded(frame, i % 3, i / 3));
+    const auto corners = vtk_array<std::int32_t>(mesh, "Name=\"connectivity\"");
+    EXPECT_EQ(corners.size(), 4 * (3 * 4 + 2 * 5));
+    EXPECT_EQ(corners[4 * 12], 20);  // the first cell of the second sheet
+    EXPECT_EQ(vtk_array<std::int32_t>(mesh, "Name=\"offsets\"").back(), corners.size());
+    ++frame;
+  }
+  EXPECT_EQ(frame, kLast + 1);
+  EXPECT_EQ(weft({"export", file_, "-f", "vtk", "-o", path("cloth.vtk")}).exit, 2);
+}
+
+// A binary glTF file.
+struct Gltf {
+  nlohmann::json json;
+  std::string bytes;
+
+  explicit Gltf(const std::string& file) {
+    EXPECT_EQ(file.substr(0, 4), "glTF");
+    EXPECT_EQ(number_at<std::uint32_t>(file, 4), 2);
+    EXPECT_EQ(number_at<std::uint32_t>(file, 8), file.size());
+    const auto length = number_at<std::uint32_t>(file, 12);
+    EXPECT_EQ(file.substr(16, 4), "JSON");
+    json = nlohmann::json::parse(file.substr(20, length));
+    EXPECT_EQ(number_at<std::uint32_t>(file, 20 + length), file.size() - 28 - length);
+    EXPECT_EQ(file.substr(24 + length, 4), std::string("BIN\0", 4));
+    bytes = file.substr(28 + length);
+    EXPECT_EQ(json["buffers"][0]["byteLength"], bytes.size());
+  }
+
+  template <class Number>
+  std::vector<Number> array(const nlohmann::json& accessor) const {
+    const nlohmann::json& view =
+        json["bufferViews"]
+            [json["accessors"][accessor.get<std::size_t>()]["bufferView"].get<std::size_t>()];
+    std::vector<Number> numbers(view["byteLength"].get<std::size_t>() / sizeof(Number));
+    std::memcpy(numbers.data(), bytes.data() + view["byteOffset"].get<std::size_t>(),
+                view["byteLength"]);
+    return numbers;
+  }
+};
+
+TEST_F(ExportsTest, GltfIsAnAnimationFromFrameToFrame) {
+  ask({"export", file_, "--format", "gltf", "--every", "4", "-o", path("cloth.glb")});
+  const Gltf gltf(read_file(path("cloth.glb")));
+  const nlohmann::json& shape = gltf.json["meshes"][0]["primitives"][0];
+  const nlohmann::json& sampler = gltf.json["animations"][0]["samplers"][0];
+  EXPECT_EQ(gltf.array<std::uint32_t>(shape["indices"]).size(), 6 * (3 * 4 + 2 * 5));
+  const auto base = gltf.array<float>(shape["attributes"]["POSITION"]);
+  const auto times = gltf.array<float>(sampler["input"]);
+  const auto weights = gltf.array<float>(sampler["output"]);
+  ASSERT_EQ(times.size(), 4);  // frames 0, 4, 8 and 12
+  ASSERT_EQ(shape["targets"].size(), 3);
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    EXPECT_FLOAT_EQ(times[k], static_cast<float>(4 * k) / 60);
+    auto shown = base;
+    for (std::size_t target = 0; target < 3; ++target) {
+      const auto moved = gltf.array<float>(shape["targets"][target]["POSITION"]);
+      for (std::size_t i = 0; i < shown.size(); ++i) shown[i] += weights[3 * k + target] * moved[i];
+    }
+    for (std::size_t i = 0; i < shown.size(); ++i)
+      ASSERT_NEAR(shown[i], recorded(static_cast<std::int64_t>(4 * k), i % 3, i / 3), 1e-6);
+  }
 }
 
 }  // namespace

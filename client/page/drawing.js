@@ -1,0 +1,256 @@
+// A recording as a scene of three.js. Lengths in m, times in s.
+'use strict';
+
+const kRamp = ['#3288bd', '#66c2a5', '#abdda4', '#e6f598', '#fee08b', '#fdae61', '#f46d43', '#d53e4f',
+  '#9e0142'];  // ColorBrewer's Spectral
+
+const vector = (given) => new THREE.Vector3(given?.x ?? 0, given?.y ?? 0, given?.z ?? 0);
+const linear = (colour) => new THREE.Color(colour).convertSRGBToLinear();
+const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+function cornersOf({min, max}) {
+  return [0, 1, 2, 3, 4, 5, 6, 7].map((k) =>
+    new THREE.Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z));
+}
+
+// The ramp in 256 steps, linear RGB.
+const kRampSteps = Float32Array.from({length: 256 * 3}, (_, k) => {
+  const place = Math.floor(k / 3) / 255 * (kRamp.length - 1);
+  const from = Math.min(Math.floor(place), kRamp.length - 2);
+  const colour = new THREE.Color(kRamp[from]).lerp(new THREE.Color(kRamp[from + 1]), place - from);
+  return colour.convertSRGBToLinear().toArray()[k % 3];
+});
+
+function pathOffset(path, t) {
+  if (!path?.length) return vector();
+  const time = (k) => path[k].time_s ?? 0;
+  if (t <= time(0)) return vector(path[0].offset_m);
+  for (let k = 1; k < path.length; ++k) {
+    if (t < time(k)) {
+      const share = (t - time(k - 1)) / (time(k) - time(k - 1));
+      return vector(path[k - 1].offset_m).lerp(vector(path[k].offset_m), share);
+    }
+  }
+  return vector(path[path.length - 1].offset_m);
+}
+
+// The shape of a collider as a mesh where it starts; a plane is shown as far as `reach`.
+function colliderMesh(collider, material, centre, reach) {
+  const add = (group, geometry, at) => {
+    const mesh = new THREE.Mesh(geometry, material);
+    mesh.position.copy(at);
+    mesh.castShadow = mesh.receiveShadow = true;
+    group.add(mesh);
+    return mesh;
+  };
+  const group = new THREE.Group();
+  if (collider.sphere) {
+    add(group, new THREE.SphereBufferGeometry(collider.sphere.radius_m, 96, 64), vector(collider.sphere.center_m));
+  } else if (collider.box) {
+    const {center_m, half_size_m, rotation} = collider.box;
+    const mesh = add(group, new THREE.BoxBufferGeometry(2 * half_size_m.x, 2 * half_size_m.y, 2 * half_size_m.z),
+      vector(center_m));
+    if (rotation) {
+      mesh.quaternion.set(rotation.x ?? 0, rotation.y ?? 0, rotation.z ?? 0, rotation.w ?? 0).normalize();
+    }
+  } else if (collider.capsule) {
+    const {radius_m, start_m, end_m} = collider.capsule;
+    const start = vector(start_m);
+    const end = vector(end_m);
+    for (const at of [start, end]) add(group, new THREE.SphereBufferGeometry(radius_m, 64, 32), at);
+    const axis = end.clone().sub(start);
+    if (axis.length() > 0) {
+      const side = add(group, new THREE.CylinderBufferGeometry(radius_m, radius_m, axis.length(), 64, 1, true),
+        start.clone().lerp(end, 0.5));
+      side.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis.normalize());
+    }
+  } else if (collider.plane) {
+    const normal = collider.plane.normal ? vector(collider.plane.normal).normalize() : new THREE.Vector3(0, 1, 0);
+    const point = vector(collider.plane.point_m);
+    const under = centre.clone().addScaledVector(normal, point.sub(centre).dot(normal));
+    const disc = add(group, new THREE.CircleBufferGeometry(reach, 96), under);
+    disc.castShadow = false;
+    disc.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), normal);
+  }
+  return group;
+}
+
+// One recording in a scene of its own.
+class Pane {
+  constructor(recording, box, up) {
+    this.recording = recording;
+    this.scene = new THREE.Scene();
+    const centre = box.getCenter(new THREE.Vector3());
+    const radius = box.getSize(new THREE.Vector3()).length() / 2;
+    this.addLights(centre, radius, up);
+    this.addCloth();
+    this.addBodies(centre, radius);
+    this.addGrid(box, up);
+    this.values = new Float32Array(recording.particles);
+    this.paint();
+  }
+
+  addLights(centre, radius, up) {
+    this.sky = new THREE.HemisphereLight(0xffffff, 0x9a938c, 0.62);
+    this.sky.position.copy(up);
+    this.sun = new THREE.DirectionalLight(0xffffff, 0.68);
+    this.sun.position.copy(centre).addScaledVector(new THREE.Vector3(-0.9, 1.1, 1.2).addScaledVector(up, 1.6), radius);
+    this.sun.target.position.copy(centre);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(1024, 1024);
+    this.sun.shadow.bias = -0.0015;
+    this.sun.shadow.radius = 3;
+    Object.assign(this.sun.shadow.camera,
+      {left: -radius, right: radius, top: radius, bottom: -radius, near: 0.1 * radius, far: 6 * radius});
+    this.scene.add(this.sky, this.sun, this.sun.target);
+  }
+
+  addCloth() {
+    const {particles, sheets, origin_m} = this.recording;
+    const attribute = () =>
+      new THREE.BufferAttribute(new Float32Array(3 * particles), 3).setUsage(THREE.DynamicDrawUsage);
+    this.position = attribute();
+    this.normal = attribute();
+    this.colour = attribute();
+
+    const cells = [];
+    const threads = [];
+    const pins = [];
+    for (const {first_particle, rows, columns, pinned} of sheets) {
+      for (const index of pinned) pins.push(first_particle + index);
+      for (let row = 0; row < rows; ++row) {
+        for (let column = 0; column < columns; ++column) {
+          const i = first_particle + row * columns + column;
+          const right = column + 1 < columns;
+          const below = row + 1 < rows;
+          if (right) threads.push(i, i + 1);
+          if (below) threads.push(i, i + columns);
+          if (right && below) cells.push(i, i + columns, i + columns + 1, i, i + columns + 1, i + 1);
+        }
+      }
+    }
+    const geometry = (index) => {
+      const made = new THREE.BufferGeometry();
+      made.setAttribute('position', this.position);
+      made.setAttribute('normal', this.normal);
+      made.setAttribute('color', this.colour);
+      made.setIndex(index);
+      return made;
+    };
+    const surface = geometry(cells);
+    const options = {polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1};
+    this.faces = [THREE.FrontSide, THREE.BackSide].map((side) => ({
+      plain: new THREE.MeshLambertMaterial({...options, side, shadowSide: THREE.DoubleSide}),
+      coloured: new THREE.MeshLambertMaterial(
+        {...options, side, shadowSide: THREE.DoubleSide, vertexColors: THREE.VertexColors}),
+    }));
+    this.cloth = new THREE.Group();
+    this.cloth.position.set(...origin_m);
+    for (const {plain} of this.faces) {
+      const mesh = new THREE.Mesh(surface, plain);
+      mesh.castShadow = mesh.receiveShadow = true;
+      this.cloth.add(mesh);
+    }
+    this.lattice = new THREE.LineSegments(geometry(threads),
+      new THREE.LineBasicMaterial({transparent: true, opacity: 0.25}));
+    this.lattice.visible = false;
+    this.pins = new THREE.Points(geometry(pins), new THREE.PointsMaterial({size: 7, sizeAttenuation: false}));
+    this.cloth.add(this.lattice, this.pins);
+    for (const child of this.cloth.children) child.frustumCulled = false;  // its bounds change with every frame
+    this.scene.add(this.cloth);
+  }
+
+  addBodies(centre, radius) {
+    // drawn a little behind its place, so that cloth that lies on it hides it
+    this.bodyMaterial = new THREE.MeshLambertMaterial({side: THREE.DoubleSide,
+      polygonOffset: true, polygonOffsetFactor: 4, polygonOffsetUnits: 4});
+    this.bodies = this.recording.colliders.map((collider) => {
+      const mesh = colliderMesh(collider, this.bodyMaterial, centre, 2.5 * radius);
+      this.scene.add(mesh);
+      return {mesh, path: collider.path};
+    });
+  }
+
+  // For scale, below everything.
+  addGrid(box, up) {
+    const size = box.getSize(new THREE.Vector3()).length();
+    const cell = 10 ** Math.floor(Math.log10(size / 4));
+    this.gridCell = cell;
+    const cells = 2 * Math.ceil(0.75 * size / cell);
+    this.grid = new THREE.GridHelper(cells * cell, cells, 0xffffff, 0xffffff);
+    Object.assign(this.grid.material, {vertexColors: THREE.NoColors, transparent: true, opacity: 0.55});
+    this.grid.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), up);
+    const centre = box.getCenter(new THREE.Vector3());
+    const lowest = Math.min(...cornersOf(box).map((corner) => corner.sub(centre).dot(up)));
+    const floor = centre.clone().addScaledVector(up, lowest);
+    this.grid.position.copy(floor);
+    this.shade = new THREE.Mesh(new THREE.CircleBufferGeometry(0.75 * size, 64),
+      new THREE.ShadowMaterial({opacity: 0.22}));
+    this.shade.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), up);
+    this.shade.position.copy(floor).addScaledVector(up, -1e-3 * size);
+    this.shade.receiveShadow = true;
+    const hasGround = this.recording.colliders.some(({plane}) => plane);
+    if (!hasGround) this.scene.add(this.grid, this.shade);
+  }
+
+  // In the colours of the theme.
+  paint() {
+    this.faces[0].plain.color.copy(linear(style('--cloth')));
+    this.faces[1].plain.color.copy(linear(style('--cloth-back')));
+    this.bodyMaterial.color.copy(linear(style('--body')));
+    this.grid.material.color.copy(linear(style('--grid')));
+    this.lattice.material.color.copy(linear(style('--lattice')));
+    this.pins.material.color.copy(linear(style('--accent')));
+  }
+
+  // Goes to time t; between frames where `between`, else at the frame before.
+  show(t, between, quantity) {
+    const place = this.recording.place(t);
+    if (!between) place.share = 0;
+    this.frame = place.frame;
+    this.recording.write(this.position.array, place);
+    this.writeNormals();
+    if (quantity) kQuantities[quantity].write(this.recording, this.values, this.position.array, place.frame);
+    this.position.needsUpdate = this.normal.needsUpdate = true;
+    for (const {mesh, path} of this.bodies) mesh.position.copy(pathOffset(path, t));
+  }
+
+  // Across the two diagonals of a particle's neighbours.
+  writeNormals() {
+    const p = this.position.array;
+    const n = this.normal.array;
+    for (const {first_particle, rows, columns} of this.recording.sheets) {
+      for (let row = 0; row < rows; ++row) {
+        for (let column = 0; column < columns; ++column) {
+          const i = 3 * (first_particle + row * columns + column);
+          const left = column > 0 ? i - 3 : i;
+          const right = column + 1 < columns ? i + 3 : i;
+          const above = row > 0 ? i - 3 * columns : i;
+          const below = row + 1 < rows ? i + 3 * columns : i;
+          const ux = p[right] - p[left], uy = p[right + 1] - p[left + 1], uz = p[right + 2] - p[left + 2];
+          const vx = p[below] - p[above], vy = p[below + 1] - p[above + 1], vz = p[below + 2] - p[above + 2];
+          const x = vy * uz - vz * uy, y = vz * ux - vx * uz, z = vx * uy - vy * ux;
+          const length = Math.hypot(x, y, z) || 1;
+          n[i] = x / length;
+          n[i + 1] = y / length;
+          n[i + 2] = z / length;
+        }
+      }
+    }
+  }
+
+  colourBy(quantity, most) {
+    this.faces.forEach(({plain, coloured}, k) => {
+      this.cloth.children[k].material = quantity ? coloured : plain;
+    });
+    if (!quantity) return;
+    const out = this.colour.array;
+    for (let i = 0; i < this.values.length; ++i) {
+      const step = 3 * Math.min(255, most > 0 ? Math.round(255 * this.values[i] / most) : 0);
+      out[3 * i] = kRampSteps[step];
+      out[3 * i + 1] = kRampSteps[step + 1];
+      out[3 * i + 2] = kRampSteps[step + 2];
+    }
+    this.colour.needsUpdate = true;
+  }
+}

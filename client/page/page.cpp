@@ -1,0 +1,234 @@
+#include "client/page/page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <string_view>
+
+#include "client/exports/output_file.h"
+#include "client/output/json.h"
+#include "client/page/facts.h"
+#include "client/page/packed_frames.h"
+#include "client/problem.h"
+#include "client/recording/points.h"
+#include "client/recording/reader.h"
+#include "client/recording/tally.h"
+
+namespace weft::client {
+
+// viewer.html with style and scripts in it
+std::string_view page_template();
+
+namespace {
+
+constexpr std::string_view kPlaceOfRecordings = "<!-- recordings -->";
+constexpr double kStepsOfSpacing = 4096;            // quanta in the finest spacing of a recording
+constexpr double kMostSteps = 1 << 30;              // from the origin
+constexpr std::int64_t kMostNumbers = 100'000'000;  // 400 MB in the browser
+
+// What the page needs to know of a recording before it holds the frames.
+struct Survey {
+  Tally tally;
+  std::array<double, 3> low{}, high{};  // of all positions, m
+  std::vector<double> times_s;
+  std::vector<v1::FrameStats> stats;
+};
+
+std::size_t particles_of(const v1::StreamHeader& header) {
+  std::size_t particles = 0;
+  for (const auto& sheet : header.sheets())
+    particles += static_cast<std::size_t>(sheet.rows()) * static_cast<std::size_t>(sheet.columns());
+  return particles;
+}
+
+Points points_of(const RecordingReader& recording, const v1::Frame& frame) {
+  return read_points(frame.positions_m(), recording.header().format().encoding());
+}
+
+FrameRange frames_of(const RecordingReader& recording, const FrameRange& wanted) {
+  const FrameRange range{.first = std::max(wanted.first, recording.first_frame()),
+                         .last = std::min(wanted.last, recording.last_frame())};
+  if (range.first > range.last)
+    throw usage_problem(fmt::format("{} has none of these frames", recording.path()));
+  const auto particles = static_cast<std::int64_t>(particles_of(recording.header()));
+  const std::int64_t most = kMostNumbers / (3 * particles);
+  if (range.last - range.first >= most) {
+    throw usage_problem(
+        fmt::format("{}: {} frames of {} particles are more than a browser holds; at most {}: "
+                    "choose with --frames A:B",
+                    recording.path(), range.last - range.first + 1, particles, most));
+  }
+  return range;
+}
+
+Survey survey_of(RecordingReader& recording, const FrameRange& range) {
+  Survey found;
+  found.low.fill(std::numeric_limits<double>::infinity());
+  found.high.fill(-std::numeric_limits<double>::infinity());
+  for (auto number = range.first; number <= range.last; ++number) {
+    const v1::Frame frame = recording.read(number);
+    const Points points = points_of(recording, frame);
+    const std::array coordinates{&points.x, &points.y, &points.z};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (const double value : *coordinates[axis]) {
+        if (!std::isfinite(value)) {
+          throw damaged(recording.path(),
+                        fmt::format("a position of frame {} is not finite", number));
+        }
+        found.low[axis] = std::min(found.low[axis], value);
+        found.high[axis] = std::max(found.high[axis], value);
+      }
+    }
+    found.tally.add(frame);
+    found.times_s.push_back(frame.time_s());
+    found.stats.push_back(frame.stats());
+  }
+  return found;
+}
+
+std::array<double, 3> middle_of(const Survey& survey) {
+  std::array<double, 3> middle{};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    middle[axis] = (survey.low[axis] + survey.high[axis]) / 2;
+  return middle;
+}
+
+double quantum_of(const v1::Scene& scene, const Survey& survey) {
+  double quantum = std::numeric_limits<double>::infinity();
+  for (const auto& sheet : scene.sheets())
+    quantum = std::min(quantum, sheet.grid().spacing_m() / kStepsOfSpacing);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    quantum = std::max(quantum, (survey.high[axis] - survey.low[axis]) / kMostSteps);
+  return quantum;
+}
+
+Json stats_json(const std::vector<v1::FrameStats>& stats) {
+  Json json;
+  for (const v1::FrameStats& frame : stats) {
+    json["kinetic_energy_j"].push_back(frame.kinetic_energy_j());
+    json["potential_energy_j"].push_back(frame.potential_energy_j());
+    json["largest_strain"].push_back(frame.largest_strain());
+    json["substep_count"].push_back(frame.substep_count());
+  }
+  return json;
+}
+
+Json sheets_json(const RecordingReader& recording) {
+  Json sheets = Json::array();
+  for (int i = 0; i < recording.header().sheets_size(); ++i) {
+    const v1::SheetLayout& layout = recording.header().sheets(i);
+    const v1::Sheet& sheet = recording.scene().sheets(i);
+    Json pinned = Json::array();
+    for (const auto& pin : sheet.pins())
+      for (const int particle : pin.particles()) pinned.push_back(particle);
+    sheets.push_back({{"first_particle", layout.first_particle()},
+                      {"rows", layout.rows()},
+                      {"columns", layout.columns()},
+                      {"spacing_m", sheet.grid().spacing_m()},
+                      {"pinned", std::move(pinned)}});
+  }
+  return sheets;
+}
+
+Json colliders_json(const v1::Scene& scene) {
+  Json colliders = Json::array();
+  for (const auto& collider : scene.colliders())
+    colliders.push_back(to_json(collider, Defaults::kLeftOut));
+  return colliders;
+}
+
+// A recording on its way to the page.
+struct Source {
+  Source(const Exhibit& exhibit, const FrameRange& wanted)
+      : name(exhibit.name),
+        recording(exhibit.path),
+        range(frames_of(recording, wanted)),
+        survey(survey_of(recording, range)),
+        quantum_m(quantum_of(recording.scene(), survey)) {}
+
+  std::string name;
+  RecordingReader recording;
+  FrameRange range;
+  Survey survey;
+  double quantum_m;
+};
+
+Json recording_json(const Source& source) {
+  const RecordingReader& recording = source.recording;
+  const Survey& survey = source.survey;
+  return {{"name", source.name},
+          {"particles", particles_of(recording.header())},
+          {"first_frame", survey.tally.first_frame},
+          {"time_s", survey.times_s},
+          {"origin_m", middle_of(survey)},
+          {"quantum_m", source.quantum_m},
+          {"low_m", survey.low},
+          {"high_m", survey.high},
+          {"stats", recording.header().format().stats() ? stats_json(survey.stats) : Json()},
+          {"sheets", sheets_json(recording)},
+          {"colliders", colliders_json(recording.scene())},
+          {"gravity_m_per_s2",
+           to_json(recording.scene().environment().gravity_m_per_s2(), Defaults::kLeftOut)},
+          {"facts", page_facts(recording, survey.tally)}};
+}
+
+// As it may stand in a script element.
+std::string script_text(const Json& json) {
+  const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string safe;
+  for (const char c : text) safe += c == '<' ? std::string("\\u003c") : std::string(1, c);
+  return safe;
+}
+
+}  // namespace
+
+PageResult write_page(const PageOrder& order,
+                      const std::function<void(const std::string& doing)>& progress) {
+  // all that may be wrong with the recordings, before there is a file
+  std::vector<Source> sources;
+  Json figures = Json::array();
+  for (const Figure& figure : order.figures) {
+    Json shown = Json::array();
+    for (const Exhibit& exhibit : figure.exhibits) {
+      progress("reading " + exhibit.path);
+      shown.push_back(sources.size());
+      sources.emplace_back(exhibit, order.frames);
+    }
+    figures.push_back(
+        {{"title", figure.title}, {"caption", figure.caption}, {"recordings", std::move(shown)}});
+  }
+
+  PageResult result;
+  Json recordings = Json::array();
+  const std::string_view page = page_template();
+  const std::size_t place = page.find(kPlaceOfRecordings);
+  OutputFile file(order.path);
+  file.write(page.substr(0, place));
+  for (Source& source : sources) {
+    progress(fmt::format("{}: {}", order.path, source.recording.path()));
+    file.write(fmt::format("<script type=\"text/plain\" id=\"frames-{}\">", recordings.size()));
+    PackedFrames frames(file, middle_of(source.survey), source.quantum_m);
+    for (auto number = source.range.first; number <= source.range.last; ++number)
+      frames.add(points_of(source.recording, source.recording.read(number)));
+    frames.finish();
+    file.write("</script>\n");
+    recordings.push_back(recording_json(source));
+    result.frames += source.survey.tally.frames;
+    result.largest_error_m = std::max(result.largest_error_m, source.quantum_m / 2);
+  }
+  const Json description{{"title", order.title},
+                         {"figures", std::move(figures)},
+                         {"recordings", std::move(recordings)}};
+  file.write("<script type=\"application/json\" id=\"page\">" + script_text(description) +
+             "</script>\n");
+  file.write(page.substr(place + kPlaceOfRecordings.size()));
+  file.close();
+  result.bytes = static_cast<std::int64_t>(std::filesystem::file_size(order.path));
+  return result;
+}
+
+}  // namespace weft::client

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "client/recording/frame_range.h"
+
+namespace weft::client {
+
+// A recording as a page shows it.
+struct Exhibit {
+  std::string name;  // above it
+  std::string path;  // of the recording
+};
+
+// Recordings that are shown side by side, in step.
+struct Figure {
+  std::string title;    // of its button, where a page has several figures
+  std::string caption;  // may be empty
+  std::vector<Exhibit> exhibits;
+};
+
+struct PageOrder {
+  std::string path;
+  std::string title;
+  std::vector<Figure> figures{};
+  FrameRange frames{};  // of every recording
+};
+
+struct PageResult {
+  std::int64_t frames = 0;     // of all recordings
+  std::int64_t bytes = 0;      // of the file
+  double largest_error_m = 0;  // of a coordinate, against the recording
+};
+
+// Writes one HTML file that plays recordings: it holds everything it needs and opens without a
+// network. Recordings are read a frame at a time, twice, so memory grows by little with their
+// length.
+PageResult write_page(const PageOrder& order,
+                      const std::function<void(const std::string& doing)>& progress);
+
+}  // namespace weft::client

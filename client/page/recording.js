@@ -1,0 +1,128 @@
+// The recordings that the page holds. Lengths in m, times in s.
+'use strict';
+
+const $ = (id) => document.getElementById(id);
+const page = JSON.parse($('page').textContent);
+const kSameTime = 1e-9;
+
+async function inflate(id) {
+  const text = atob($(id).textContent.trim());
+  const packed = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; ++i) packed[i] = text.charCodeAt(i);
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+// Positions as whole numbers of the quantum: x, y, z of particle 0, of particle 1 ... of every frame.
+// client/page/packed_frames.h says how they are packed.
+function unpack(bytes, frames, values) {
+  const numbers = new Int32Array(frames * values);
+  for (let frame = 0; frame < frames; ++frame) {
+    const at = 4 * frame * values;
+    const out = frame * values;
+    for (let i = 0; i < values; ++i) {
+      const zigzag = bytes[at + i] | (bytes[at + values + i] << 8) |
+        (bytes[at + 2 * values + i] << 16) | (bytes[at + 3 * values + i] << 24);
+      const before = frame > 0 ? numbers[out - values + i] : 0;
+      numbers[out + i] = before + ((zigzag >>> 1) ^ -(zigzag & 1));
+    }
+  }
+  return numbers;
+}
+
+// Index of the last time that is not after t; 0 where all are.
+function indexAt(times, t) {
+  let low = 0;
+  let high = times.length - 1;
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= t + kSameTime) low = middle; else high = middle - 1;
+  }
+  return low;
+}
+
+// What the page says of a recording, with its frames.
+class Recording {
+  constructor(facts, numbers) {
+    Object.assign(this, facts);
+    this.numbers = numbers;
+    this.values = 3 * this.particles;
+    this.most = {};  // largest value of a quantity over all frames
+  }
+
+  // Where between two frames t lies.
+  place(t) {
+    const frame = indexAt(this.time_s, t);
+    const next = Math.min(frame + 1, this.time_s.length - 1);
+    const step = this.time_s[next] - this.time_s[frame];
+    return {frame, next, share: step > 0 ? Math.min(1, Math.max(0, (t - this.time_s[frame]) / step)) : 0};
+  }
+
+  // Positions relative to origin_m.
+  write(positions, {frame, next, share}) {
+    const a = frame * this.values;
+    const b = next * this.values;
+    for (let i = 0; i < this.values; ++i) {
+      const from = this.numbers[a + i];
+      positions[i] = (from + (this.numbers[b + i] - from) * share) * this.quantum_m;
+    }
+  }
+
+  // Speed of every particle, m/s, on the way from the frame before.
+  writeSpeeds(out, _, frame) {
+    const before = Math.max(frame - 1, 0);
+    const step = this.time_s[frame] - this.time_s[before];
+    const scale = step > 0 ? this.quantum_m / step : 0;
+    for (let i = 0, a = frame * this.values, b = before * this.values; i < this.particles; ++i, a += 3, b += 3) {
+      out[i] = scale * Math.hypot(this.numbers[a] - this.numbers[b],
+        this.numbers[a + 1] - this.numbers[b + 1], this.numbers[a + 2] - this.numbers[b + 2]);
+    }
+  }
+
+  // Largest strain of a particle's stretch connections, (l - L) / L; 0 where none is stretched.
+  writeStrains(out, p) {
+    out.fill(0);
+    for (const {first_particle, rows, columns, spacing_m} of this.sheets) {
+      const stretch = (i, j) => {
+        const length = Math.hypot(p[3 * i] - p[3 * j], p[3 * i + 1] - p[3 * j + 1], p[3 * i + 2] - p[3 * j + 2]);
+        const strain = length / spacing_m - 1;
+        if (strain > out[i]) out[i] = strain;
+        if (strain > out[j]) out[j] = strain;
+      };
+      for (let row = 0; row < rows; ++row) {
+        for (let column = 0; column < columns; ++column) {
+          const i = first_particle + row * columns + column;
+          if (column + 1 < columns) stretch(i, i + 1);
+          if (row + 1 < rows) stretch(i, i + columns);
+        }
+      }
+    }
+  }
+
+  largest(quantity) {
+    if (!(quantity in this.most)) {
+      const positions = new Float32Array(this.values);
+      const values = new Float32Array(this.particles);
+      this.most[quantity] = 0;
+      for (let frame = 0; frame < this.time_s.length; ++frame) {
+        this.write(positions, {frame, next: frame, share: 0});
+        kQuantities[quantity].write(this, values, positions, frame);
+        for (const value of values) if (value > this.most[quantity]) this.most[quantity] = value;
+      }
+    }
+    return this.most[quantity];
+  }
+}
+
+const kQuantities = {
+  strain: {
+    title: 'Strain, largest at a particle',
+    text: (value) => `${(100 * value).toPrecision(3)} %`,
+    write: (recording, out, positions, frame) => recording.writeStrains(out, positions, frame),
+  },
+  speed: {
+    title: 'Speed of a particle',
+    text: (value) => `${value.toPrecision(3)} m/s`,
+    write: (recording, out, positions, frame) => recording.writeSpeeds(out, positions, frame),
+  },
+};

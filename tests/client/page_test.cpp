@@ -1,0 +1,175 @@
+#include <gmock/gmock.h>
+#include <zlib.h>
+
+#include <cmath>
+#include <pugixml.hpp>
+
+#include "client/recording/points.h"
+#include "client/recording/reader.h"
+#include "tests/client/client_test.h"
+
+namespace weft::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::int64_t kEnd = 20;
+
+// Recordings of a hung sheet and of one that falls beside a ball.
+class PageTest : public ClientTest {
+ protected:
+  PageTest() {
+    service_.create(small_scene(), "hung");
+    v1::Scene scene = small_scene();
+    scene.mutable_sheets(0)->clear_pins();
+    scene.mutable_sheets(0)->mutable_placement()->mutable_origin_m()->set_y(3);
+    scene.add_colliders()->mutable_sphere()->set_radius_m(0.2);
+    service_.create(scene, "fallen");
+    for (const std::string name : {"hung", "fallen"}) {
+      ask({"record", name, "--run", "--to", std::to_string(kEnd), "--encoding", "float64", "-o",
+           path(name + ".weft")});
+    }
+  }
+
+  const std::string hung_ = path("hung.weft");
+  const std::string fallen_ = path("fallen.weft");
+  const std::string page_ = path("page.html");
+};
+
+// What stands in the script element of an id.
+std::string element(const std::string& page, const std::string& id) {
+  const std::size_t start = page.find('>', page.find("id=\"" + id + "\"")) + 1;
+  return page.substr(start, page.find("</script>", start) - start);
+}
+
+nlohmann::json description(const std::string& page) {
+  return nlohmann::json::parse(element(page, "page"));
+}
+
+std::string from_base64(const std::string& text) {
+  const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes;
+  unsigned bits = 0;
+  int count = 0;
+  for (const char c : text) {
+    if (c == '=') break;
+    bits = bits << 6 | static_cast<unsigned>(digits.find(c));
+    count += 6;
+    if (count < 8) continue;
+    count -= 8;
+    bytes += static_cast<char>(bits >> count & 255);
+  }
+  return bytes;
+}
+
+// Coordinates of every frame, m, in the order x, y, z of particle 0, of particle 1 ...
+std::vector<std::vector<double>> decode(const std::string& page, std::size_t index) {
+  const nlohmann::json facts = description(page)["recordings"][index];
+  const std::size_t frames = facts["time_s"].size();
+  const std::size_t values = 3 * facts["particles"].get<std::size_t>();
+  const std::string packed = from_base64(element(page, "frames-" + std::to_string(index)));
+  std::string planes(4 * values * frames, '\0');
+  uLongf length = planes.size();
+  EXPECT_EQ(uncompress(reinterpret_cast<Bytef*>(planes.data()), &length,
+                       reinterpret_cast<const Bytef*>(packed.data()), packed.size()),
+            Z_OK);
+  EXPECT_EQ(length, planes.size());
+
+  std::vector<std::int64_t> numbers(values);
+  std::vector<std::vector<double>> decoded(frames, std::vector<double>(values));
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    for (std::size_t i = 0; i < values; ++i) {
+      std::int64_t zigzag = 0;
+      for (std::size_t plane = 4; plane-- > 0;)
+        zigzag =
+            zigzag * 256 + static_cast<unsigned char>(planes[(4 * frame + plane) * values + i]);
+      numbers[i] += zigzag % 2 == 0 ? zigzag / 2 : -(zigzag + 1) / 2;
+      decoded[frame][i] = facts["origin_m"][i % 3].get<double>() +
+                          static_cast<double>(numbers[i]) * facts["quantum_m"].get<double>();
+    }
+  }
+  return decoded;
+}
+
+TEST_F(PageTest, NeedsNoNetwork) {
+  ask({"view", hung_, "-o", page_});
+  const std::string page = read_file(page_);
+  EXPECT_THAT(page, HasSubstr("content=\"default-src 'none'; script-src 'unsafe-inline'; "
+                              "style-src 'unsafe-inline'\""));
+  EXPECT_THAT(page, AllOf(Not(HasSubstr("<link")), Not(HasSubstr("<img")), Not(HasSubstr("url(")),
+                          Not(HasSubstr("@import")), Not(HasSubstr("<script src"))));
+  EXPECT_LT(page.size(), 1'500'000);
+}
+
+TEST_F(PageTest, HoldsEveryPositionWithinTheErrorItStates) {
+  const double bound = ask({"view", hung_, fallen_, "-o", page_})["largest_error_m"];
+  EXPECT_LE(bound, 0.05 / 8192);  // of the spacing
+  const std::string page = read_file(page_);
+  for (const std::size_t index : {0, 1}) {
+    const auto decoded = decode(page, index);
+    ASSERT_EQ(decoded.size(), kEnd + 1);
+    client::RecordingReader recording(index == 0 ? hung_ : fallen_);
+    for (std::size_t frame = 0; frame < decoded.size(); ++frame) {
+      const auto recorded =
+          client::read_points(recording.read(static_cast<std::int64_t>(frame)).positions_m(),
+                              recording.header().format().encoding());
+      for (std::size_t i = 0; i < recorded.x.size(); ++i) {
+        ASSERT_NEAR(decoded[frame][3 * i], recorded.x[i], bound + 1e-12);
+        ASSERT_NEAR(decoded[frame][3 * i + 1], recorded.y[i], bound + 1e-12);
+        ASSERT_NEAR(decoded[frame][3 * i + 2], recorded.z[i], bound + 1e-12);
+      }
+    }
+  }
+}
+
+TEST_F(PageTest, SaysWhatItShows) {
+  ask({"view", hung_, fallen_, "--frames", "5:8", "-o", page_});
+  const nlohmann::json page = description(read_file(page_));
+  EXPECT_EQ(page["title"], "hung, fallen");
+  EXPECT_EQ(page["figures"][0]["recordings"], (nlohmann::json{0, 1}));
+  const nlohmann::json& hung = page["recordings"][0];
+  EXPECT_EQ(hung["first_frame"], 5);
+  EXPECT_EQ(hung["time_s"].size(), 4);
+  EXPECT_EQ(hung["stats"]["largest_strain"].size(), 4);
+  EXPECT_EQ(hung["sheets"][0]["pinned"], (nlohmann::json{0, 4}));
+  EXPECT_EQ(page["recordings"][1]["colliders"][0]["sphere"]["radius_m"], 0.2);
+  EXPECT_THAT(page.dump(), AllOf(HasSubstr("[\"k_s, stretch\",\"200 N/m\"]"),
+                                 HasSubstr("[\"spacing\",\"50 mm\"]")));
+}
+
+TEST_F(PageTest, ATitleCannotEndItsScript) {
+  const std::string title = "</script><script>alert(1)</script>";
+  ask({"view", hung_, "--title", title, "-o", page_});
+  EXPECT_EQ(description(read_file(page_))["title"], title);
+}
+
+TEST_F(PageTest, WhatCannotBeShownIsRefused) {
+  EXPECT_EQ(weft({"view", hung_, "--frames", "90:", "-o", page_}).exit, 2);
+  EXPECT_EQ(weft({"view", path("none.weft"), "-o", page_}).exit, 4);
+  EXPECT_THAT(weft({"view", hung_, "-o", hung_}).err, HasSubstr("it is the recording itself"));
+  EXPECT_EQ(client::RecordingReader(hung_).last_frame(), kEnd);
+}
+
+TEST_F(PageTest, APlotHasCurvesOfEnergyStrainSpeedAndSubsteps) {
+  ask({"plot", hung_, fallen_, "-o", path("plot.svg")});
+  pugi::xml_document svg;
+  ASSERT_TRUE(svg.load_file(path("plot.svg").c_str()));
+  std::vector<std::size_t> curves;
+  std::vector<std::size_t> points;
+  for (const auto& plot : svg.first_child().children("svg")) {
+    curves.push_back(0);
+    for (const auto& curve : plot.child("svg").children("polyline")) {
+      const std::string text = curve.attribute("points").value();
+      points.push_back(static_cast<std::size_t>(std::count(text.begin(), text.end(), ',')));
+      ++curves.back();
+    }
+  }
+  EXPECT_EQ(curves, (std::vector<std::size_t>{4, 2, 2, 2}));
+  EXPECT_THAT(points, Each(::testing::AnyOf(kEnd, kEnd + 1)));
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -1,0 +1,161 @@
+// The page of `weft view` in Chromium, by what a person does. Usage:
+//   node --test tests/page/   with WEFT and CHROMIUM naming the programs, PICTURES a directory
+import assert from 'node:assert/strict';
+import {execFileSync} from 'node:child_process';
+import {createHash} from 'node:crypto';
+import {mkdtempSync, rmSync, statSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+import {pathToFileURL} from 'node:url';
+import {after, before, test} from 'node:test';
+import {chromium} from 'playwright-core';
+
+const directory = mkdtempSync(join(tmpdir(), 'weft-page-'));
+const file = (name) => join(directory, name);
+const weft = (...words) => execFileSync(process.env.WEFT, words, {stdio: ['ignore', 'ignore', 'inherit']});
+let browser;
+
+before(async () => {
+  for (const [name, stiffness] of [['limp', '0'], ['stiff', '0.3']]) {
+    weft('scene', 'new', '--template', 'paper-3', '--bend', stiffness, '-o', file(`${name}.json`));
+    weft('record', file(`${name}.json`), '--embedded', '--to', '40', '-o', file(`${name}.weft`));
+  }
+  weft('view', file('limp.weft'), file('stiff.weft'), '-o', file('pair.html'), '--title', 'Limp and stiff');
+  weft('view', file('stiff.weft'), '-o', file('one.html'));
+  browser = await chromium.launch({
+    executablePath: process.env.CHROMIUM,
+    args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
+  });
+});
+
+after(async () => {
+  await browser?.close();
+  rmSync(directory, {recursive: true});
+});
+
+// The page from disk, without a network, standing at its first frame; what goes wrong in it fails the test.
+async function open(name, options = {}) {
+  const context = await browser.newContext({reducedMotion: 'reduce', offline: true, viewport: {width: 1280, height: 800}, ...options});
+  const page = await context.newPage();
+  const problems = [];
+  page.on('pageerror', (error) => problems.push(error.message));
+  page.on('console', (said) => said.type() === 'error' && problems.push(said.text()));
+  page.on('request', (request) => request.url().startsWith('file:') || problems.push(request.url()));
+  await page.goto(pathToFileURL(file(name)).href);
+  await page.waitForSelector('body[data-state=ready]');
+  await settle(page);
+  return {page, close: async () => { await context.close(); assert.deepEqual(problems, []); }};
+}
+
+// Until what was asked for has been drawn.
+const settle = (page) => page.evaluate(() => new Promise((done) =>
+  requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
+const picture = (page, name) => page.screenshot({path: join(process.env.PICTURES, `${name}.png`)});
+const plain = (text) => text.replaceAll('\u00a0', ' ');
+const clock = (page) => page.textContent('#clock');
+// What the canvas shows, to be compared.
+const canvas = async (page) => createHash('sha256').update(await page.locator('#view').screenshot()).digest('hex');
+
+test('one recording is shown with its facts', async () => {
+  const {page, close} = await open('one.html');
+  assert.equal(await clock(page), '0.000 / 4.000 s');
+  const facts = plain(await page.textContent('#facts'));
+  for (const fact of ['31 x 31', '33.33 mm', '3e-05 N m²', '2000 N/m', '32 line segments']) assert.ok(facts.includes(fact), fact);
+  assert.match(await page.textContent('#precision'), /within 4\.1 µm/);
+  await page.keyboard.press('End');
+  await settle(page);
+  assert.equal(await clock(page), '4.000 / 4.000 s');
+  await picture(page, 'one');
+  await close();
+});
+
+test('keys, buttons and the slider go through the frames', async () => {
+  const {page, close} = await open('one.html');
+  const steps = [
+    [() => page.keyboard.press('ArrowRight'), '0.100'],
+    [() => page.keyboard.press('Shift+ArrowRight'), '1.100'],
+    [() => page.keyboard.press('ArrowLeft'), '1.000'],
+    [() => page.getByLabel('One frame forward').click(), '1.100'],
+    [() => page.getByLabel('First frame').click(), '0.000'],
+    [() => page.getByLabel('Simulated time').fill('25'), '2.500'],
+    [() => page.keyboard.press('Home'), '0.000'],
+  ];
+  for (const [act, time] of steps) {
+    await act();
+    await settle(page);
+    assert.equal(await clock(page), `${time} / 4.000 s`);
+  }
+  await close();
+});
+
+test('it plays to the end and stops there', async () => {
+  const {page, close} = await open('one.html');
+  await page.locator('#speed').selectOption('4');
+  await page.getByLabel('Play', {exact: true}).click();
+  await page.waitForFunction(() => document.getElementById('clock').textContent.startsWith('4.000 /'));
+  await page.getByLabel('Play', {exact: true}).waitFor();
+  await close();
+});
+
+test('dragging turns the view, and F fits it again', async () => {
+  const {page, close} = await open('one.html');
+  await page.keyboard.press('End');
+  await settle(page);
+  const fitted = await canvas(page);
+  await page.mouse.move(400, 400);
+  await page.mouse.down();
+  await page.mouse.move(600, 380, {steps: 4});
+  await page.mouse.up();
+  await settle(page);
+  assert.notEqual(await canvas(page), fitted);
+  await page.keyboard.press('f');
+  await page.evaluate(() => document.activeElement.blur());  // takes away the ring around it
+  await settle(page);
+  assert.equal(await canvas(page), fitted);
+  await close();
+});
+
+test('two recordings stand side by side in step, with what differs in bold', async () => {
+  const {page, close} = await open('pair.html');
+  await page.keyboard.press('End');
+  await settle(page);
+  const names = await page.locator('#names div').allTextContents();
+  assert.match(names[0], /^limpframe 40, strain up to /);
+  assert.match(names[1], /^stiffframe 40, strain up to /);
+  assert.deepEqual(await page.locator('tr.differs th').filter({hasText: 'k_b'}).allTextContents(), ['k_b,\u00a0bend']);
+  await picture(page, 'pair');
+  await page.locator('#colour').selectOption('strain');
+  await page.getByRole('button', {name: 'Theme'}).click();
+  await settle(page);
+  assert.match(await page.textContent('#most'), /^\d+(\.\d+)? %$/);
+  await picture(page, 'pair-strain-dark');
+  await close();
+});
+
+test('on a phone everything fits the width, and a finger turns the view', async () => {
+  const {page, close} = await open('pair.html', {viewport: {width: 390, height: 844}, hasTouch: true, deviceScaleFactor: 2});
+  await page.getByLabel('Simulated time').fill('30');
+  await settle(page);
+  assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
+  const before = await canvas(page);
+  const touch = (type, x) => page.locator('#view').dispatchEvent(type, {touches: type === 'touchend' ? [] : [{identifier: 0, pageX: x, pageY: 300, clientX: x, clientY: 300}]});
+  await touch('touchstart', 150);
+  await touch('touchmove', 250);
+  await touch('touchend', 250);
+  await settle(page);
+  assert.notEqual(await canvas(page), before);
+  await picture(page, 'phone');
+  await close();
+});
+
+test('ten seconds of 31 x 31 at 60 frames a second take less than 5 MB', async () => {
+  weft('scene', 'new', '--template', 'flag', '--rows', '31', '-o', file('flag.json'));
+  weft('record', file('flag.json'), '--embedded', '--to', '599', '-o', file('flag.weft'));
+  weft('view', file('flag.weft'), '-o', file('flag.html'));
+  assert.ok(statSync(file('flag.html')).size < 5e6, `${statSync(file('flag.html')).size} bytes`);
+  const {page, close} = await open('flag.html');
+  await page.keyboard.press('End');
+  await settle(page);
+  await picture(page, 'flag');
+  await close();
+});

@@ -106,7 +106,9 @@ grpc::Status SessionService::get(const v1::GetSessionRequest& request,
                                  v1::Session& response) const {
   const auto found = find_session(backend_.registry, request.name());
   if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
-  response = to_proto(*std::get<std::shared_ptr<Session>>(found));
+  const auto& session = std::get<std::shared_ptr<Session>>(found);
+  session->attend();
+  response = to_proto(*session);
   return grpc::Status::OK;
 }
 

@@ -71,6 +71,15 @@ SessionStatus Session::status() const {
   return {state_, history_.latest(), textiles_, plan_, repairs_, failure_, lateness_};
 }
 
+void Session::attend() {
+  {
+    std::lock_guard lock(mutex_);
+    attended_ = Clock::now();
+    if (!release()) return;
+  }
+  wake();
+}
+
 void Session::submit(Command command) {
   std::optional<Refusal> refusal;
   {
@@ -602,7 +611,7 @@ std::optional<Clock::time_point> Session::next_due() {
     return past_holders_ ? std::optional(past_holders_->until) : std::nullopt;
   }
   if (restoring_) return Clock::time_point::min();
-  if (nobody_waits()) {
+  if (unattended()) {
     held_ = true;
     return std::nullopt;
   }
@@ -633,8 +642,9 @@ std::shared_ptr<const Frame> Session::make_frame(std::vector<Repair> repairs) co
 }
 
 // Whether the frames to come are all like the last one, without a goal and with nobody to see them.
-bool Session::nobody_waits() const {
-  return simulation_.asleep() && subscriptions_.empty() && !steps_begun() && !run_->until_frame;
+bool Session::unattended() const {
+  return simulation_.asleep() && subscriptions_.empty() && !steps_begun() && !run_->until_frame &&
+         Clock::now() > attended_ + kAttention;
 }
 
 // While it is restored it shows nothing else, but a failure.

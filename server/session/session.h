@@ -69,6 +69,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   static constexpr std::size_t kMaxCommands = 256;
   // Answers that are remembered, for those who send a named request again.
   static constexpr std::size_t kMaxAnswers = 1000;
+  // How long a session that sleeps without a goal and a stream goes on after somebody looked.
+  static constexpr std::chrono::seconds kAttention{2};
   // How long a session that was restored waits for subscribers that it had held frames for.
   static constexpr std::chrono::seconds kHoldAfterRestore{30};
 
@@ -90,6 +92,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   SessionStatus status() const;
 
   void submit(Command command);
+
+  // Somebody looks: one that sleeps goes on for kAttention, also without a goal and a stream.
+  void attend();
 
   // Looks again whether callers have cancelled their steps.
   void wake() { scheduler_.wake(shared_from_this()); }
@@ -164,7 +169,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::vector<Repair> take_repairs();
   void fail(const std::string& why);
   std::optional<Clock::time_point> next_due();
-  bool nobody_waits() const;
+  bool unattended() const;
   std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs) const;
 
   // with the mutex held
@@ -213,7 +218,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::chrono::duration<double> lateness_{};
   History history_;
   std::vector<Subscription*> subscriptions_;
-  bool held_ = false;  // idle until a subscriber comes, or reads on
+  bool held_ = false;  // idle until somebody comes, or a subscriber reads on
+  Clock::time_point attended_;
   Writing writing_;
   Reach reach_;                   // as it was written last
   std::int64_t ahead_ = 16;       // frames that the reach is put ahead

@@ -43,6 +43,7 @@ void Session::unsubscribe(const Subscription& subscription) {
   {
     std::lock_guard lock(mutex_);
     std::erase(subscriptions_, &subscription);
+    attended_ = Clock::now();
     if (!release()) return;
   }
   wake();

@@ -69,7 +69,7 @@ bool is_idle(Scheduler& scheduler, const Session& session) {
   return session.status().newest->number == frame;
 }
 
-TEST(Session, AsleepWithoutGoalAndStreamTakesNoTurn) {
+TEST(Session, AsleepWithoutGoalAndUnattendedTakesNoTurn) {
   Scheduler scheduler(1);
   const auto session = sleeping_session(scheduler);
   while (!is_idle(scheduler, *session)) {
@@ -86,6 +86,16 @@ TEST(Session, AsleepGoesOnWithItsFirstStream) {
   const std::int64_t next = session->status().newest->number + 1;
   const auto watcher = Watcher::of(*session, next);
   EXPECT_EQ(watcher->read().frame->number, next);
+}
+
+TEST(Session, AsleepGoesOnAsLongAsSomebodyLooks) {
+  Scheduler scheduler(1);
+  const auto session = sleeping_session(scheduler);
+  while (!is_idle(scheduler, *session)) {
+  }
+  const std::int64_t frame = session->status().newest->number;
+  while (session->status().newest->number < frame + 100) session->attend();
+  EXPECT_EQ(session->status().newest->substeps, 0);
 }
 
 TEST(Session, AsleepGoesOnWithAnotherTextile) {

@@ -16,6 +16,7 @@ constexpr const char* kFooter = R"(A first run:
   weft scene new --template sphere -o scene.json
   weft session create scene.json --id drape
   weft record drape --run --until-rest -o drape.weft
+  weft view drape.weft -o drape.html
   weft export drape.weft --format obj -o drape
 
 With --embedded no server is needed: it lives within the command, and SESSION is a scene file.

@@ -117,7 +117,7 @@ void run_plot(Context& context, const PlotOptions& options) {
 void add_plot(CLI::App& app, Context& context) {
   auto options = std::make_shared<PlotOptions>();
   CLI::App* command =
-      app.add_subcommand("plot", "Draw energy, strain, speed and substeps of recordings over time");
+      app.add_subcommand("plot", "Draw energy, strain, speed and substeps over time");
   command->add_option("FILE", options->recordings, "Recordings, up to 4 in one picture")
       ->option_text("...")
       ->required()

@@ -57,8 +57,7 @@ void run_view(Context& context, const ViewOptions& options) {
 
 void add_view(CLI::App& app, Context& context) {
   auto options = std::make_shared<ViewOptions>();
-  CLI::App* command = app.add_subcommand(
-      "view", "Write a page that plays recordings: one HTML file that needs no network");
+  CLI::App* command = app.add_subcommand("view", "Write a page that plays recordings in a browser");
   command->add_option("FILE", options->recordings, "Recordings, up to 6, shown in step")
       ->option_text("...")
       ->required()

@@ -92,7 +92,7 @@ std::vector<std::uint32_t> triangles_of(const std::vector<v1::SheetLayout>& shee
   std::vector<std::uint32_t> triangles;
   for (const auto& sheet : sheets) {
     for (const Quad& quad : quads_of(sheet)) {
-      for (const std::size_t corner : {0, 1, 2, 0, 2, 3})
+      for (const std::size_t corner : {0U, 1U, 2U, 0U, 2U, 3U})
         triangles.push_back(static_cast<std::uint32_t>(quad[corner]));
     }
   }
@@ -113,9 +113,10 @@ class GltfWriter : public FrameWriter {
   }
 
   void add(const ExportFrame& frame) override {
-    if (!times_.empty() && !(frame.time_s - start_ > times_.back()))
-      throw usage_problem("an animation wants times that increase");
     if (times_.empty()) start_ = frame.time_s;
+    const auto time = static_cast<float>(frame.time_s - start_);
+    if (!times_.empty() && time <= times_.back())
+      throw usage_problem("--times: those of an animation increase");
     Vectors positions = positions_of(frame.points);
     Vectors normals = normals_of(frame.points, triangles_);
     if (times_.empty()) {
@@ -126,7 +127,7 @@ class GltfWriter : public FrameWriter {
       normals = difference(normals, base_normals_);
     }
     bounds_[times_.size()] = bounds_of(positions);
-    times_.push_back(static_cast<float>(frame.time_s - start_));
+    times_.push_back(time);
     file_.write(bytes_of(positions));
     file_.write(bytes_of(normals));
   }

@@ -18,7 +18,7 @@ class Appended {
  public:
   // The XML of an array.
   std::string add(std::string_view type, std::string_view attributes, std::string_view bytes) {
-    const std::string element =
+    std::string element =
         fmt::format("<DataArray type=\"{}\" {} format=\"appended\" offset=\"{}\"/>\n", type,
                     attributes, bytes_.size());
     const std::uint64_t length = bytes.size();

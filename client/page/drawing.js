@@ -34,6 +34,19 @@ function pathOffset(path, t) {
   return vector(path[path.length - 1].offset_m);
 }
 
+// Direction of a plane, and the point on it that is nearest to another one.
+function surfaceOf(plane, place) {
+  const normal = plane.normal ? vector(plane.normal).normalize() : new THREE.Vector3(0, 1, 0);
+  const height = vector(plane.point_m).sub(place).dot(normal);
+  return {normal, point: place.clone().addScaledVector(normal, height)};
+}
+
+// Where the view and the light come from: seen from the front, and to its right.
+function frontOf(up) {
+  const front = Math.abs(up.z) > 0.9 ? new THREE.Vector3(0, -1, 0) : new THREE.Vector3(0, 0, 1);
+  return {front, right: up.clone().cross(front)};
+}
+
 // The shape of a collider as a mesh where it starts; a plane is shown as far as `reach`.
 function colliderMesh(collider, material, centre, reach) {
   const add = (group, geometry, at) => {
@@ -65,10 +78,8 @@ function colliderMesh(collider, material, centre, reach) {
       side.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis.normalize());
     }
   } else if (collider.plane) {
-    const normal = collider.plane.normal ? vector(collider.plane.normal).normalize() : new THREE.Vector3(0, 1, 0);
-    const point = vector(collider.plane.point_m);
-    const under = centre.clone().addScaledVector(normal, point.sub(centre).dot(normal));
-    const disc = add(group, new THREE.CircleBufferGeometry(reach, 96), under);
+    const {normal, point} = surfaceOf(collider.plane, centre);
+    const disc = add(group, new THREE.CircleBufferGeometry(reach, 96), point);
     disc.castShadow = false;
     disc.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), normal);
   }
@@ -94,7 +105,9 @@ class Pane {
     this.sky = new THREE.HemisphereLight(0xffffff, 0x9a938c, 0.62);
     this.sky.position.copy(up);
     this.sun = new THREE.DirectionalLight(0xffffff, 0.68);
-    this.sun.position.copy(centre).addScaledVector(new THREE.Vector3(-0.9, 1.1, 1.2).addScaledVector(up, 1.6), radius);
+    const {front, right} = frontOf(up);
+    this.sun.position.copy(centre).addScaledVector(up, 2.7 * radius)
+      .addScaledVector(front, 1.2 * radius).addScaledVector(right, -0.9 * radius);
     this.sun.target.position.copy(centre);
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(1024, 1024);
@@ -162,8 +175,8 @@ class Pane {
 
   addBodies(centre, radius) {
     // drawn a little behind its place, so that cloth that lies on it hides it
-    this.bodyMaterial = new THREE.MeshLambertMaterial({side: THREE.DoubleSide,
-      polygonOffset: true, polygonOffsetFactor: 4, polygonOffsetUnits: 4});
+    this.bodyMaterial = new THREE.MeshLambertMaterial(
+      {polygonOffset: true, polygonOffsetFactor: 4, polygonOffsetUnits: 4});
     this.bodies = this.recording.colliders.map((collider) => {
       const mesh = colliderMesh(collider, this.bodyMaterial, centre, 2.5 * radius);
       this.scene.add(mesh);
@@ -171,26 +184,32 @@ class Pane {
     });
   }
 
-  // For scale, below everything.
+  // For scale: on the first plane, or else below everything.
   addGrid(box, up) {
     const size = box.getSize(new THREE.Vector3()).length();
-    const cell = 10 ** Math.floor(Math.log10(size / 4));
-    this.gridCell = cell;
-    const cells = 2 * Math.ceil(0.75 * size / cell);
-    this.grid = new THREE.GridHelper(cells * cell, cells, 0xffffff, 0xffffff);
+    this.gridCell = 10 ** Math.floor(Math.log10(size / 4));
+    const cells = 2 * Math.ceil(0.75 * size / this.gridCell);
+    this.grid = new THREE.GridHelper(cells * this.gridCell, cells, 0xffffff, 0xffffff);
     Object.assign(this.grid.material, {vertexColors: THREE.NoColors, transparent: true, opacity: 0.55});
-    this.grid.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), up);
+    this.scene.add(this.grid);
+
     const centre = box.getCenter(new THREE.Vector3());
+    const ground = this.recording.colliders.find(({plane}) => plane);
+    if (ground) {
+      const {normal, point} = surfaceOf(ground.plane, centre);
+      this.grid.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), normal);
+      this.grid.position.copy(point);
+      return;
+    }
     const lowest = Math.min(...cornersOf(box).map((corner) => corner.sub(centre).dot(up)));
-    const floor = centre.clone().addScaledVector(up, lowest);
-    this.grid.position.copy(floor);
-    this.shade = new THREE.Mesh(new THREE.CircleBufferGeometry(0.75 * size, 64),
+    this.grid.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), up);
+    this.grid.position.copy(centre).addScaledVector(up, lowest);
+    const shade = new THREE.Mesh(new THREE.CircleBufferGeometry(0.75 * size, 64),
       new THREE.ShadowMaterial({opacity: 0.22}));
-    this.shade.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), up);
-    this.shade.position.copy(floor).addScaledVector(up, -1e-3 * size);
-    this.shade.receiveShadow = true;
-    const hasGround = this.recording.colliders.some(({plane}) => plane);
-    if (!hasGround) this.scene.add(this.grid, this.shade);
+    shade.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), up);
+    shade.position.copy(this.grid.position).addScaledVector(up, -1e-3 * size);
+    shade.receiveShadow = true;
+    this.scene.add(shade);
   }
 
   // In the colours of the theme.

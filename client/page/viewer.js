@@ -72,8 +72,7 @@ class Viewer {
   fit() {
     const centre = this.box.getCenter(new THREE.Vector3());
     const radius = this.box.getSize(new THREE.Vector3()).length() / 2;
-    const front = Math.abs(this.up.z) > 0.9 ? new THREE.Vector3(0, -1, 0) : new THREE.Vector3(0, 0, 1);
-    const right = this.up.clone().cross(front);
+    const {front, right} = frontOf(this.up);
     const from = front.addScaledVector(right, 0.55).addScaledVector(this.up, 0.45).normalize();
     const x = this.up.clone().cross(from).normalize();
     const y = from.clone().cross(x);

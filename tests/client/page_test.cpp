@@ -108,7 +108,7 @@ TEST_F(PageTest, HoldsEveryPositionWithinTheErrorItStates) {
   const double bound = ask({"view", hung_, fallen_, "-o", page_})["largest_error_m"];
   EXPECT_LE(bound, 0.05 / 8192);  // of the spacing
   const std::string page = read_file(page_);
-  for (const std::size_t index : {0, 1}) {
+  for (const std::size_t index : {0U, 1U}) {
     const auto decoded = decode(page, index);
     ASSERT_EQ(decoded.size(), kEnd + 1);
     client::RecordingReader recording(index == 0 ? hung_ : fallen_);

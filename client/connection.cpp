@@ -9,7 +9,8 @@ namespace {
 
 std::shared_ptr<grpc::Channel> open_channel(const std::string& address) {
   grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(-1);  // the server bounds what it sends
+  arguments.SetMaxReceiveMessageSize(-1);                   // the server bounds what it sends
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // a socket for each connection
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
@@ -41,13 +42,18 @@ std::unique_ptr<Connection> Connection::to(const std::string& address, std::stop
 }
 
 std::unique_ptr<Connection> Connection::embedded(std::stop_token stop) {
-  auto server = std::make_unique<Embedded>();
+  auto server = std::make_shared<Embedded>();
   const auto channel = server->channel();
   return std::unique_ptr<Connection>(
       new Connection(std::move(server), "the embedded server", channel, std::move(stop)));
 }
 
-Connection::Connection(std::unique_ptr<Embedded> server, std::string address,
+std::unique_ptr<Connection> Connection::another() const {
+  const auto channel = embedded_ ? embedded_->channel() : open_channel(address_);
+  return std::unique_ptr<Connection>(new Connection(embedded_, address_, channel, stop_));
+}
+
+Connection::Connection(std::shared_ptr<Embedded> server, std::string address,
                        const std::shared_ptr<grpc::Channel>& channel, std::stop_token stop)
     : embedded_(std::move(server)),
       address_(std::move(address)),

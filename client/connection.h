@@ -23,6 +23,8 @@ class Connection {
   // A request to stop cancels every call.
   static std::unique_ptr<Connection> to(const std::string& address, std::stop_token stop);
   static std::unique_ptr<Connection> embedded(std::stop_token stop);
+  // One more to the same server, for more calls than one carries.
+  std::unique_ptr<Connection> another() const;
   ~Connection();
 
   // The answer, or a Problem.
@@ -43,6 +45,9 @@ class Connection {
   }
 
   v1::Session get_session(const std::string& name);  // "sessions/flag"
+  v1::SessionService::Stub& sessions() {
+    return *std::get<std::unique_ptr<v1::SessionService::Stub>>(stubs_);
+  }
   v1::FrameService::Stub& frames() {
     return *std::get<std::unique_ptr<v1::FrameService::Stub>>(stubs_);
   }
@@ -53,10 +58,10 @@ class Connection {
 
  private:
   class Embedded;
-  Connection(std::unique_ptr<Embedded> server, std::string address,
+  Connection(std::shared_ptr<Embedded> server, std::string address,
              const std::shared_ptr<grpc::Channel>& channel, std::stop_token stop);
 
-  std::unique_ptr<Embedded> embedded_;
+  std::shared_ptr<Embedded> embedded_;
   std::string address_;
   std::stop_token stop_;
   std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,

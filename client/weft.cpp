@@ -74,6 +74,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_diff(app, context);
   add_export(app, context);
   add_script(app, context);
+  add_load(app, context);
   add_demo(app, context);
 }
 

@@ -22,6 +22,7 @@ void add_verify(CLI::App& app, Context& context);
 void add_diff(CLI::App& app, Context& context);
 void add_export(CLI::App& app, Context& context);
 void add_script(CLI::App& app, Context& context);
+void add_load(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
 
 using Sessions = v1::SessionService::Stub;

@@ -54,12 +54,13 @@ std::unique_ptr<Connection> Connection::another() const {
 }
 
 Connection::Connection(std::shared_ptr<Embedded> server, std::string address,
-                       const std::shared_ptr<grpc::Channel>& channel, std::stop_token stop)
+                       std::shared_ptr<grpc::Channel> channel, std::stop_token stop)
     : embedded_(std::move(server)),
       address_(std::move(address)),
       stop_(std::move(stop)),
-      stubs_(v1::SessionService::NewStub(channel), v1::FrameService::NewStub(channel),
-             v1::TextileService::NewStub(channel), v1::ServerService::NewStub(channel)) {}
+      channel_(std::move(channel)),
+      stubs_(v1::SessionService::NewStub(channel_), v1::FrameService::NewStub(channel_),
+             v1::TextileService::NewStub(channel_), v1::ServerService::NewStub(channel_)) {}
 
 Connection::~Connection() = default;
 
@@ -67,6 +68,10 @@ v1::Session Connection::get_session(const std::string& name) {
   v1::GetSessionRequest request;
   request.set_name(name);
   return call(&v1::SessionService::Stub::GetSession, request);
+}
+
+void Connection::await_server(std::chrono::milliseconds longest) {
+  channel_->WaitForConnected(std::chrono::system_clock::now() + longest);
 }
 
 void Connection::check(const grpc::Status& status) const {

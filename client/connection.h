@@ -2,6 +2,7 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <memory>
 #include <stop_token>
 #include <string>
@@ -53,17 +54,21 @@ class Connection {
   }
   const std::stop_token& stop() const { return stop_; }
 
+  // Waits until the server can be reached, at most so long. Between calls nobody works on that.
+  void await_server(std::chrono::milliseconds longest);
+
   // Throws what is wrong, if anything.
   void check(const grpc::Status& status) const;
 
  private:
   class Embedded;
   Connection(std::shared_ptr<Embedded> server, std::string address,
-             const std::shared_ptr<grpc::Channel>& channel, std::stop_token stop);
+             std::shared_ptr<grpc::Channel> channel, std::stop_token stop);
 
   std::shared_ptr<Embedded> embedded_;
   std::string address_;
   std::stop_token stop_;
+  std::shared_ptr<grpc::Channel> channel_;
   std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,
              std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>>
       stubs_;

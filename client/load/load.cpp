@@ -217,7 +217,7 @@ class Load {
   void send(void (Sessions::async_interface::*method)(grpc::ClientContext*, const Request*,
                                                       Response*, std::function<void(grpc::Status)>),
             const char* name, const Request& request, Then then) {
-    const auto call = std::make_shared<Call<Request, Response>>();
+    auto call = std::make_shared<Call<Request, Response>>();
     call->request = request;
     {
       const std::lock_guard lock(mutex_);
@@ -228,18 +228,21 @@ class Load {
           std::chrono::system_clock::now() +
           std::chrono::duration_cast<std::chrono::system_clock::duration>(patience));
     }
-    auto answered = [this, call, name, then](const grpc::Status& status) {
+    auto answered = [this, call, name, then](const grpc::Status& status) mutable {
       const auto time = Clock::now();
       {
         const std::lock_guard lock(mutex_);
         count_error(name, status);
       }
       then(status.ok() ? &call->response : nullptr, time);
+      call.reset();  // which holds the channel, and the last to do so must not be gRPC's own thread
       const std::lock_guard lock(mutex_);
       --calls_;
       changed_.notify_all();
     };
-    (connection_.sessions().async()->*method)(&call->context, &call->request, &call->response,
+    Call<Request, Response>& sent = *call;
+    call.reset();
+    (connection_.sessions().async()->*method)(&sent.context, &sent.request, &sent.response,
                                               std::move(answered));
   }
 

@@ -13,7 +13,8 @@ namespace {
 
 std::shared_ptr<grpc::Channel> open_channel(const std::string& address) {
   grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(-1);  // the server bounds what it sends
+  arguments.SetMaxReceiveMessageSize(-1);                   // the server bounds what it sends
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // a socket for each connection
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, 100);
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 2000);
@@ -45,20 +46,25 @@ std::unique_ptr<Connection> Connection::to(const std::string& address, std::stop
 }
 
 std::unique_ptr<Connection> Connection::embedded(std::stop_token stop) {
-  auto server = std::make_unique<Embedded>();
+  auto server = std::make_shared<Embedded>();
   const auto channel = server->channel();
   return std::unique_ptr<Connection>(
       new Connection(std::move(server), "the embedded server", channel, std::move(stop)));
 }
 
-Connection::Connection(std::unique_ptr<Embedded> server, std::string address,
-                       const std::shared_ptr<grpc::Channel>& channel, std::stop_token stop)
+std::unique_ptr<Connection> Connection::another() const {
+  const auto channel = embedded_ ? embedded_->channel() : open_channel(address_);
+  return std::unique_ptr<Connection>(new Connection(embedded_, address_, channel, stop_));
+}
+
+Connection::Connection(std::shared_ptr<Embedded> server, std::string address,
+                       std::shared_ptr<grpc::Channel> channel, std::stop_token stop)
     : embedded_(std::move(server)),
       address_(std::move(address)),
-      channel_(channel),
       stop_(std::move(stop)),
-      stubs_(v1::SessionService::NewStub(channel), v1::FrameService::NewStub(channel),
-             v1::TextileService::NewStub(channel), v1::ServerService::NewStub(channel)) {}
+      channel_(std::move(channel)),
+      stubs_(v1::SessionService::NewStub(channel_), v1::FrameService::NewStub(channel_),
+             v1::TextileService::NewStub(channel_), v1::ServerService::NewStub(channel_)) {}
 
 Connection::~Connection() = default;
 
@@ -89,6 +95,10 @@ bool Connection::is_serving() {
   response.DumpToSingleSlice(&bytes);
   constexpr std::string_view kServing = "\x08\x01";  // HealthCheckResponse{status: SERVING}
   return std::string_view(reinterpret_cast<const char*>(bytes.begin()), bytes.size()) == kServing;
+}
+
+void Connection::await_server(std::chrono::milliseconds longest) {
+  channel_->WaitForConnected(std::chrono::system_clock::now() + longest);
 }
 
 void Connection::check(const grpc::Status& status) const {

@@ -2,6 +2,7 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <memory>
 #include <stop_token>
 #include <string>
@@ -23,6 +24,8 @@ class Connection {
   // A request to stop cancels every call.
   static std::unique_ptr<Connection> to(const std::string& address, std::stop_token stop);
   static std::unique_ptr<Connection> embedded(std::stop_token stop);
+  // One more to the same server, for more calls than one carries.
+  std::unique_ptr<Connection> another() const;
   ~Connection();
 
   // The answer, or a Problem.
@@ -45,23 +48,29 @@ class Connection {
   v1::Session get_session(const std::string& name);  // "sessions/flag"
   // Whether the server takes calls, as its gRPC health service says.
   bool is_serving();
+  v1::SessionService::Stub& sessions() {
+    return *std::get<std::unique_ptr<v1::SessionService::Stub>>(stubs_);
+  }
   v1::FrameService::Stub& frames() {
     return *std::get<std::unique_ptr<v1::FrameService::Stub>>(stubs_);
   }
   const std::stop_token& stop() const { return stop_; }
+
+  // Waits until the server can be reached, at most so long. Between calls nobody works on that.
+  void await_server(std::chrono::milliseconds longest);
 
   // Throws what is wrong, if anything.
   void check(const grpc::Status& status) const;
 
  private:
   class Embedded;
-  Connection(std::unique_ptr<Embedded> server, std::string address,
-             const std::shared_ptr<grpc::Channel>& channel, std::stop_token stop);
+  Connection(std::shared_ptr<Embedded> server, std::string address,
+             std::shared_ptr<grpc::Channel> channel, std::stop_token stop);
 
-  std::unique_ptr<Embedded> embedded_;
+  std::shared_ptr<Embedded> embedded_;
   std::string address_;
-  std::shared_ptr<grpc::Channel> channel_;
   std::stop_token stop_;
+  std::shared_ptr<grpc::Channel> channel_;
   std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,
              std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>>
       stubs_;

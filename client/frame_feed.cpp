@@ -10,7 +10,7 @@ namespace weft::client {
 namespace {
 
 constexpr std::chrono::milliseconds kFirstPause{50};
-constexpr std::chrono::milliseconds kLongestPause{1000};
+constexpr std::chrono::milliseconds kLongestPause{250};
 
 void wait(std::chrono::milliseconds time, const std::stop_token& stop) {
   std::mutex mutex;
@@ -94,6 +94,7 @@ void FrameFeed::open_again(const grpc::Status& status) {
       came_from_weftd(status) || !header_seen_ || Clock::now() - last_heard_ > patience_;
   if (hopeless) connection_.check(status);
   wait(pause_, stop_);
+  connection_.await_server(kLongestPause);
   pause_ = std::min(2 * pause_, kLongestPause);
   ++reconnections_;
   open();

@@ -79,6 +79,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_view(app, context);
   add_script(app, context);
   add_health(app, context);
+  add_load(app, context);
   add_demo(app, context);
 }
 

@@ -26,6 +26,7 @@ void add_plot(CLI::App& app, Context& context);
 void add_view(CLI::App& app, Context& context);
 void add_script(CLI::App& app, Context& context);
 void add_health(CLI::App& app, Context& context);
+void add_load(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
 
 using Sessions = v1::SessionService::Stub;

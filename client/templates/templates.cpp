@@ -195,6 +195,26 @@ v1::Scene paper_4(const TemplateOptions& options) {
   return scene;
 }
 
+// Moves for ever, so that a server has work: its air never rests.
+v1::Scene load(const TemplateOptions& options) {
+  v1::Scene scene;
+  v1::Sheet* sheet = add_sheet(scene, {.damping = 2e-4}, options);
+  if (!options.textile) {
+    v1::RawTextile* textile = sheet->mutable_textile()->mutable_raw();
+    textile->set_particle_mass_kg(1e-3);
+    textile->set_stretch_n_per_m(1000);
+    textile->set_shear_n_per_m(1000);
+    textile->set_bend_n_m2(1e-5);
+  }
+  stand(*sheet);
+  pin_corners(*sheet);
+  v1::Wind* wind = scene.mutable_environment()->mutable_wind();
+  set(wind->mutable_velocity_m_per_s(), 1, 0, 4);
+  wind->set_gust(0.8);
+  wind->set_gust_period_s(1.5);
+  return scene;
+}
+
 struct Template {
   const char* name;
   const char* description;
@@ -208,6 +228,7 @@ constexpr std::array kTemplates = {
     Template{"sphere", "a cloth of 1 m x 1 m that falls on a ball", sphere},
     Template{"flag", "a cloth held along one side in gusts of wind", flag},
     Template{"cantilever", "a strip of 24 mm that hangs 30 mm over an edge", cantilever},
+    Template{"load", "1 m x 1 m of 1 g particles that gusts keep in motion, for load tests", load},
     Template{"paper-1", "the paper's experiment 1: hung from two corners, starts level", paper_1,
              true},
     Template{"paper-2", "the paper's experiment 2: falls on a box, k_b 0 and 0.1", paper_2, true},

@@ -11,7 +11,7 @@
 #include "client/recording/reader.h"
 #include "tests/client/breaking_proxy.h"
 #include "tests/client/client_test.h"
-#include "tests/client/process.h"
+#include "tests/support/service/process.h"
 
 namespace weft::testing {
 namespace {

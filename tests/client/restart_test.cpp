@@ -9,7 +9,7 @@
 
 #include "client/recording/reader.h"
 #include "tests/client/client_test.h"
-#include "tests/client/process.h"
+#include "tests/support/service/process.h"
 
 namespace weft::testing {
 namespace {

@@ -38,7 +38,7 @@ TEST(Templates, are_listed_with_a_description) {
     names.push_back(info.name);
     EXPECT_FALSE(info.description.empty()) << info.name;
   }
-  EXPECT_THAT(names, ElementsAre("hang", "box", "sphere", "flag", "cantilever", "paper-1",
+  EXPECT_THAT(names, ElementsAre("hang", "box", "sphere", "flag", "cantilever", "load", "paper-1",
                                  "paper-2", "paper-3", "paper-4"));
 }
 

@@ -1,4 +1,4 @@
-#include "tests/client/process.h"
+#include "tests/support/service/process.h"
 
 #include <fcntl.h>
 #include <signal.h>

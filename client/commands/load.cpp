@@ -1,0 +1,326 @@
+#include "client/load/load.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <tuple>
+
+#include "client/commands/commands.h"
+#include "client/input_file.h"
+#include "client/output/status.h"
+#include "client/output/text.h"
+#include "client/scene_file.h"
+#include "client/templates/templates.h"
+
+namespace weft::client {
+namespace {
+
+struct LoadOptions {
+  std::string scene;
+  std::string scene_template = "load";
+  LoadOrder order;
+  std::optional<double> rate;
+  double ramp_s = 1;
+  double duration_s = 10;
+  bool find_limit = false;
+  std::optional<double> target_s;
+  std::string against;
+};
+
+constexpr std::array kQuantiles{std::pair{"p50", 0.5}, std::pair{"p90", 0.9},
+                                std::pair{"p99", 0.99}, std::pair{"p99_9", 0.999},
+                                std::pair{"max", 1.0}};
+
+double frames_per_s(const LoadResult& result) {
+  return static_cast<double>(result.frames_received) / result.wall.count();
+}
+
+std::string errors_text(const LoadResult& result) {
+  std::string text;
+  for (const auto& [reason, count] : result.errors)
+    text += fmt::format("{}{} x {}", text.empty() ? "" : ", ", count, reason);
+  return text;
+}
+
+std::string frames_text(const LoadOrder& order, const LoadResult& result) {
+  const std::string due =
+      order.drive == Drive::kFree ? "" : fmt::format(" of {} due", result.frames_due);
+  return fmt::format("{}{}, {} lost, {} doubled", result.frames_received, due, result.frames_lost,
+                     result.frames_doubled);
+}
+
+std::vector<std::string> progress_lines(const LoadOrder& order, const LoadResult& result,
+                                        double elapsed_s) {
+  const double whole = (order.ramp + order.duration).count();
+  return {fmt::format("{}  {:.0f} of {:.0f} s", bar(elapsed_s / whole), elapsed_s, whole),
+          fmt::format("sessions  {} of {}", result.sessions, order.sessions),
+          fmt::format("frames    {}", frames_text(order, result)),
+          fmt::format("lateness  {} p50, {} p99", seconds_text(result.frame.quantile(0.5)),
+                      seconds_text(result.frame.quantile(0.99))),
+          fmt::format("errors    {}", result.error_count())};
+}
+
+std::string load_text(const LoadOrder& order, const LoadResult& result) {
+  Table table({"LATENESS", "COUNT", "P50", "P90", "P99", "P99.9", "MAX"});
+  for (const auto& [name, latencies] :
+       {std::pair{"create", &result.create}, std::pair{"step", &result.step},
+        std::pair{"frame", &result.frame}}) {
+    if (latencies->count() == 0) continue;
+    std::vector<std::string> row{name, std::to_string(latencies->count())};
+    for (const auto& [label, fraction] : kQuantiles)
+      row.push_back(seconds_text(latencies->quantile(fraction)));
+    table.add(row);
+  }
+  Facts facts;
+  facts.add("sessions", std::to_string(result.sessions))
+      .add("frames", frames_text(order, result))
+      .add("received", fmt::format("{:.1f} frames/s", frames_per_s(result)))
+      .add("computed", fmt::format("{} substeps", result.substeps))
+      .add("own processor", fmt::format("{:.2f} of a core", result.cpu / result.wall));
+  for (const auto& [reason, count] : result.errors)
+    facts.add("errors", fmt::format("{} x {}", count, reason));
+  return table.text() + '\n' + facts.text();
+}
+
+Json load_json(const LoadOrder& order, const LoadResult& result) {
+  constexpr std::array kDrives{"paced", "stepped", "free"};
+  Json json{{"sessions", order.sessions},
+            {"subscribers", order.subscribers},
+            {"drive", kDrives[static_cast<std::size_t>(order.drive)]},
+            {"rate_per_s", order.rate_per_s},
+            {"sessions_created", result.sessions},
+            {"frames_due", result.frames_due},
+            {"frames_received", result.frames_received},
+            {"frames_per_s", frames_per_s(result)},
+            {"frames_lost", result.frames_lost},
+            {"frames_doubled", result.frames_doubled},
+            {"substeps", result.substeps},
+            {"wall_s", result.wall.count()},
+            {"cpu_s", result.cpu.count()}};
+  for (const auto& [name, latencies] :
+       {std::pair{"create_s", &result.create}, std::pair{"step_s", &result.step},
+        std::pair{"frame_s", &result.frame}}) {
+    json[name]["count"] = latencies->count();
+    for (const auto& [label, fraction] : kQuantiles)
+      json[name][label] = latencies->quantile(fraction);
+  }
+  json["errors"] = result.errors;
+  return json;
+}
+
+// One load beside another.
+std::string change_text(const Json& before, const Json& now) {
+  Table table({"FIGURE", "BEFORE", "NOW", "CHANGE"});
+  const auto add = [&](const std::string& name, const Json& old_value, const Json& new_value,
+                       std::string (*text)(double)) {
+    const auto was = old_value.get<double>();
+    const auto is = new_value.get<double>();
+    table.add({name, text(was), text(is),
+               was > 0 ? fmt::format("{:+.1f} %", 100 * (is / was - 1)) : std::string("-")});
+  };
+  add("sessions", before.at("sessions"), now.at("sessions"), number_text);
+  add("frames a second", before.at("frames_per_s"), now.at("frames_per_s"), number_text);
+  for (const auto& [name, times] : {std::pair{"create", "create_s"}, std::pair{"step", "step_s"},
+                                    std::pair{"frame", "frame_s"}}) {
+    if (now.at(times).at("count") == 0) continue;
+    for (const char* quantile : {"p50", "p99", "max"}) {
+      add(fmt::format("{} {}", name, quantile), before.at(times).at(quantile),
+          now.at(times).at(quantile), seconds_text);
+    }
+  }
+  add("frames lost", before.at("frames_lost"), now.at("frames_lost"), number_text);
+  return table.text();
+}
+
+Json read_earlier(const std::string& path) try {
+  Json json = Json::parse(read_text(path));
+  std::ignore = change_text(json, json);  // has all that is compared
+  return json;
+} catch (const Json::exception&) {
+  throw malformed(path, "this is not what weft load --json answers");
+}
+
+// Lines that change in place: how far a load is.
+class LoadView {
+ public:
+  LoadView(Context& context, const LoadOrder& order)
+      : order_(order), status_(context.terminal.err, context.terminal.err_is_watched) {}
+
+  void show(int sessions, const LoadResult& so_far) {
+    if (sessions != sessions_) start_ = std::chrono::steady_clock::now();
+    sessions_ = sessions;
+    order_.sessions = sessions;
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
+    status_.show(progress_lines(order_, so_far, elapsed.count()));
+  }
+  void clear() { status_.clear(); }
+
+ private:
+  LoadOrder order_;
+  Status status_;
+  int sessions_ = 0;
+  std::chrono::steady_clock::time_point start_;
+};
+
+void load_once(Context& context, const LoadOrder& order, const std::string& against) {
+  const std::optional<Json> before =
+      against.empty() ? std::nullopt : std::optional(read_earlier(against));
+  LoadView view(context, order);
+  const LoadResult result = apply_load(context.connection(), order, [&](const LoadResult& so_far) {
+    view.show(order.sessions, so_far);
+  });
+  view.clear();
+  const Json json = load_json(order, result);
+  std::string text = load_text(order, result);
+  if (before) text += '\n' + change_text(*before, json);
+  context.answer(json, text);
+  if (context.stop.stop_requested()) throw interrupted();
+  if (!result.clean()) {
+    throw Problem(Exit::kRefused, "FAILED_PRECONDITION", "LOAD_FAILED",
+                  fmt::format("{}, {} lost, {} doubled", count_of(result.error_count(), "error"),
+                              count_of(result.frames_lost, "frame"), result.frames_doubled));
+  }
+}
+
+std::string why_not(const Probe& probe) {
+  if (probe.holds) return "";
+  if (probe.result.error_count() > 0) return errors_text(probe.result);
+  return probe.result.clean() ? "too late" : "frames lost or doubled";
+}
+
+void search_limit(Context& context, const LoadOrder& order, double target_s) {
+  Table table({"SESSIONS", "P50", "P99", "MAX", "FRAMES/S", "OWN CPU", "HOLDS", "WHY NOT"});
+  Json probes = Json::array();
+  LoadView view(context, order);
+  LimitSearch search;
+  search.first = order.sessions;
+  search.target_s = target_s;
+  const auto tried = [&](const Probe& probe) {
+    LoadOrder tried_order = order;
+    tried_order.sessions = probe.sessions;
+    const Latencies& frame = probe.result.frame;
+    Json json = load_json(tried_order, probe.result);
+    json["holds"] = probe.holds;
+    probes.push_back(std::move(json));
+    table.add({std::to_string(probe.sessions), seconds_text(frame.quantile(0.5)),
+               seconds_text(frame.quantile(0.99)), seconds_text(frame.quantile(1)),
+               fmt::format("{:.0f}", frames_per_s(probe.result)),
+               fmt::format("{:.2f}", probe.result.cpu / probe.result.wall),
+               probe.holds ? "yes" : "no", why_not(probe)});
+  };
+  const int limit =
+      find_limit(context.connection(), order, search, tried,
+                 [&](int sessions, const LoadResult& so_far) { view.show(sessions, so_far); });
+  view.clear();
+  if (context.stop.stop_requested()) throw interrupted();
+  context.answer({{"limit", limit}, {"target_s", target_s}, {"probes", std::move(probes)}},
+                 fmt::format("{}\n{} hold {:g} frames/s with 99 % within {}\n", table.text(),
+                             count_of(limit, "session"), order.rate_per_s, seconds_text(target_s)));
+  if (limit == 0) {
+    throw Problem(Exit::kRefused, "FAILED_PRECONDITION", "LOAD_FAILED",
+                  "not even one session holds");
+  }
+}
+
+// What the sessions would be: with every default filled in.
+v1::Scene checked_scene(Connection& connection, const LoadOptions& options) {
+  v1::CreateSessionRequest request;
+  request.set_validate_only(true);
+  const v1::Scene scene =
+      options.scene.empty() ? make_template(options.scene_template) : read_scene(options.scene);
+  return create_session(connection, scene, request).scene();
+}
+
+void run_load(Context& context, const LoadOptions& options) {
+  LoadOrder order = options.order;
+  if (order.drive == Drive::kFree && options.find_limit)
+    throw usage_problem("--find-limit: no frame is late where the drive is free");
+  constexpr std::int64_t kMostStreams = 100'000;
+  if (std::int64_t{order.sessions} * order.subscribers > kMostStreams) {
+    throw usage_problem(fmt::format("{} sessions x {} subscribers are more than {} streams",
+                                    order.sessions, order.subscribers, kMostStreams));
+  }
+  if (order.frames && order.subscribers == 0)
+    throw usage_problem("--frames: without subscribers nobody counts them");
+  order.scene = checked_scene(context.connection(), options);
+  order.ramp = std::chrono::duration<double>(options.ramp_s);
+  order.duration = std::chrono::duration<double>(options.duration_s);
+  const double frame_step_s = order.scene.solver().frame_step_s();
+  order.rate_per_s = options.rate.value_or(1 / frame_step_s);
+  const double time_scale = order.rate_per_s * frame_step_s;
+  if (order.drive == Drive::kPaced && (time_scale < 1e-3 || time_scale > 1000)) {
+    throw usage_problem(
+        fmt::format("--rate: {:g} frames/s of {} each are {:g} times real time; "
+                    "a server paces 0.001 to 1000 times",
+                    order.rate_per_s, seconds_text(frame_step_s), time_scale));
+  }
+  if (options.find_limit)
+    return search_limit(context, order, options.target_s.value_or(1 / order.rate_per_s));
+  load_once(context, order, options.against);
+}
+
+constexpr const char* kLoadFooter =
+    R"(paced    sessions run by themselves at the rate
+stepped  a call for every frame, when it is due and the one before is answered
+free     sessions run as fast as their subscribers read; nothing is late
+
+Lateness counts from the time a call or a frame was due, whether or not the
+server kept up; what never came counts as it had waited at the end. What was
+due within the ramp is not timed. With --embedded the processor time is the
+server's too. The sessions are deleted in the end.)";
+
+}  // namespace
+
+void add_load(CLI::App& app, Context& context) {
+  auto options = std::make_shared<LoadOptions>();
+  LoadOrder& order = options->order;
+  const std::map<std::string, Drive> drives{
+      {"paced", Drive::kPaced}, {"stepped", Drive::kStepped}, {"free", Drive::kFree}};
+  CLI::App* command =
+      app.add_subcommand("load", "Load a server with sessions and say how late their frames are");
+  auto* scene = command->add_option("--scene", options->scene, "Scene file of every session")
+                    ->type_name("FILE");
+  command->add_option("-t,--template", options->scene_template, "Template instead of a file")
+      ->type_name("NAME")
+      ->excludes(scene)
+      ->capture_default_str();
+  command->add_option("--sessions", order.sessions, "How many; with --find-limit the first try")
+      ->type_name("N")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str();
+  command->add_option("--subscribers", order.subscribers, "Streams of each session")
+      ->type_name("N")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str();
+  command->add_option("--drive", order.drive, "What makes sessions advance [paced]")
+      ->transform(CLI::CheckedTransformer(drives))
+      ->option_text("paced|stepped|free");
+  command->add_option("--rate", options->rate, "Frames a second of each; else the scene's own")
+      ->type_name("R")
+      ->check(CLI::Range(1e-3, 1e5));
+  command->add_option("--frames", order.frames, "End when each session has so many")
+      ->type_name("N")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000}));
+  command->add_option("--ramp", options->ramp_s, "Seconds in which the sessions are created")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 1e5))
+      ->capture_default_str();
+  command->add_option("--duration", options->duration_s, "Seconds after the ramp")
+      ->type_name("S")
+      ->check(CLI::Range(0.01, 1e6))
+      ->capture_default_str();
+  auto* limit = command->add_flag("--find-limit", options->find_limit,
+                                  "Search how many sessions hold --target");
+  command
+      ->add_option("--target", options->target_s, "How late 99 of 100 may be, s; else an interval")
+      ->type_name("S")
+      ->check(CLI::PositiveNumber)
+      ->needs(limit);
+  command->add_option("--against", options->against, "Compare with an earlier answer to --json")
+      ->type_name("FILE")
+      ->excludes(limit);
+  command->footer(kLoadFooter);
+  command->callback([&context, options] { run_load(context, *options); });
+}
+
+}  // namespace weft::client

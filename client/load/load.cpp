@@ -1,0 +1,522 @@
+#include "client/load/load.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <queue>
+#include <tuple>
+#include <vector>
+
+#include "client/problem.h"
+
+namespace weft::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
+
+constexpr std::chrono::milliseconds kReportInterval{500};
+// What proxies take over one connection, and less than the 1024 that a server does.
+constexpr int kStreamsOfAConnection = 100;
+
+Clock::duration ticks(Seconds seconds) {
+  return std::chrono::duration_cast<Clock::duration>(seconds);
+}
+
+Seconds processor_time() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& time) {
+    return Seconds(static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec));
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+// One load from its first call to its last. Calls go out from apply(), answers and frames come in
+// on gRPC's threads; no lock is held while gRPC is called, which may answer at once.
+class Load {
+ public:
+  Load(Connection& connection, const LoadOrder& order,
+       const std::function<void(const LoadResult&)>& progress)
+      : connection_(connection), order_(order), progress_(progress) {
+    const std::int64_t streams = std::int64_t{order.sessions} * order.subscribers;
+    for (std::int64_t i = 0; i < streams; i += kStreamsOfAConnection)
+      stream_connections_.push_back(connection.another());
+  }
+
+  LoadResult apply() {
+    const Seconds cpu = processor_time();
+    start_ = Clock::now();
+    measured_from_ = start_ + ticks(order_.ramp);
+    end_ = measured_from_ + ticks(order_.duration);
+    sessions_ = std::vector<LoadedSession>(static_cast<std::size_t>(order_.sessions));
+    for (std::size_t i = 0; i < sessions_.size(); ++i) {
+      const double share = static_cast<double>(i) / static_cast<double>(sessions_.size());
+      sessions_[i].index = static_cast<int>(i);
+      agenda_.push({start_ + ticks(order_.ramp * share), &sessions_[i], 0});
+    }
+    const std::stop_callback wake(connection_.stop(), [this] {
+      const std::lock_guard lock(mutex_);
+      changed_.notify_all();
+    });
+    send_what_is_due();
+    const Seconds end_cpu = processor_time();
+    stop_sessions();
+    const auto last = Clock::now() + ticks(order_.grace);
+    wait_until(last, [&] { return calls_ == 0 && (stopped() || all_received()); });
+    {
+      const std::lock_guard lock(mutex_);
+      count_missing();
+      result_.wall = end_ - start_;
+      result_.cpu = end_cpu - cpu;
+    }
+    remove_all();
+    return std::move(result_);
+  }
+
+ private:
+  using Sessions = v1::SessionService::Stub;
+  class Subscriber;
+
+  struct LoadedSession {
+    int index = 0;
+    v1::Session session;  // name and uid; no name: not created
+    std::vector<std::unique_ptr<Subscriber>> subscribers;
+    int openings = 0;  // subscribers whose stream is to open yet
+    double frame_step_s = 0;
+    Clock::time_point origin = Clock::time_point::max();  // when its frame 0 would have been due
+    std::int64_t steps = 0;                               // answered
+    std::optional<std::int64_t> last_frame;               // that it computed, once that is known
+  };
+
+  // A stream of one session's frames.
+  class Subscriber : public grpc::ClientReadReactor<v1::StreamFramesResponse> {
+   public:
+    Subscriber(Load& load, LoadedSession& session, int index)
+        : load_(load), session_(session), index_(index) {
+      request_.set_session(session.session.name());
+      request_.set_uid(session.session.uid());
+      request_.set_start_frame(1);
+      request_.mutable_format()->set_stats(true);
+      if (load.order_.drive == Drive::kFree) request_.set_slow_reader(v1::SLOW_READER_HOLD_SESSION);
+    }
+
+    void start(v1::FrameService::Stub& stub) {
+      stub.async()->StreamFrames(&context_, &request_, this);
+      StartRead(&message_);
+      StartCall();
+    }
+    void cancel() { context_.TryCancel(); }
+
+    void OnReadDone(bool ok) override {
+      if (!ok) return;
+      if (message_.has_frame()) {
+        load_.receive(session_, *this, message_.frame(), Clock::now());
+      } else if (message_.has_header()) {
+        note_opening();
+      }
+      StartRead(&message_);
+    }
+
+    void OnDone(const grpc::Status& status) override {
+      note_opening();  // where it did not open it is not waited for
+      load_.end_stream(*this, status);
+    }
+
+    int index() const { return index_; }
+
+    std::int64_t next_frame = 1;  // guarded by the load, as is `ended`
+    bool ended = false;
+
+   private:
+    void note_opening() {
+      if (!std::exchange(opening_noted_, true)) load_.note_opening(session_);
+    }
+
+    Load& load_;
+    LoadedSession& session_;
+    int index_;
+    bool opening_noted_ = false;
+    grpc::ClientContext context_;
+    v1::StreamFramesRequest request_;
+    v1::StreamFramesResponse message_;
+  };
+
+  // A call to be sent: the creation of a session, or a step of it.
+  struct Due {
+    Clock::time_point time;
+    LoadedSession* session;
+    std::int64_t step;  // the frame that it makes; 0: the creation
+
+    bool operator<(const Due& other) const {  // the first one due on top
+      return std::tie(other.time, other.session->index) < std::tie(time, session->index);
+    }
+  };
+
+  template <class Request, class Response>
+  struct Call {
+    grpc::ClientContext context;
+    Request request;
+    Response response;
+  };
+
+  bool stopped() const { return connection_.stop().stop_requested(); }
+  Seconds interval() const { return Seconds(1 / order_.rate_per_s); }
+
+  void send_what_is_due() {
+    auto next_report = start_;
+    std::unique_lock lock(mutex_);
+    while (!stopped() && Clock::now() < end_ && !(order_.frames && all_received())) {
+      const auto now = Clock::now();
+      if (now >= next_report) {
+        next_report = now + kReportInterval;
+        report(lock);
+      } else if (!agenda_.empty() && agenda_.top().time <= now) {
+        const Due due = agenda_.top();
+        agenda_.pop();
+        lock.unlock();
+        if (due.step == 0) {
+          create(*due.session, due.time);
+        } else {
+          step(*due.session, due.step);
+        }
+        lock.lock();
+      } else {
+        auto until = std::min(end_, next_report);
+        if (!agenda_.empty()) until = std::min(until, agenda_.top().time);
+        changed_.wait_until(lock, until);
+      }
+    }
+    closing_ = true;
+    end_ = std::min(end_, Clock::now());
+  }
+
+  void report(std::unique_lock<std::mutex>& lock) {
+    if (!progress_) return;
+    result_.frames_due = 0;
+    for (const LoadedSession& session : sessions_)
+      result_.frames_due += frames_due(session, Clock::now()) * order_.subscribers;
+    const LoadResult so_far = result_;
+    lock.unlock();
+    progress_(so_far);
+    lock.lock();
+  }
+
+  template <class Done>
+  void wait_until(Clock::time_point end, Done done) {
+    std::unique_lock lock(mutex_);
+    changed_.wait_until(lock, end, done);
+  }
+
+  // Sends a call; `then` hears when it was answered and how.
+  template <class Request, class Response, class Then>
+  void send(void (Sessions::async_interface::*method)(grpc::ClientContext*, const Request*,
+                                                      Response*, std::function<void(grpc::Status)>),
+            const char* name, const Request& request, Then then) {
+    auto call = std::make_shared<Call<Request, Response>>();
+    call->request = request;
+    {
+      const std::lock_guard lock(mutex_);
+      ++calls_;
+      // so that every call is answered some time after the end
+      const auto patience = std::max(Seconds(end_ - Clock::now()), Seconds(0)) + order_.grace;
+      call->context.set_deadline(
+          std::chrono::system_clock::now() +
+          std::chrono::duration_cast<std::chrono::system_clock::duration>(patience));
+    }
+    auto answered = [this, call, name, then](const grpc::Status& status) mutable {
+      const auto time = Clock::now();
+      {
+        const std::lock_guard lock(mutex_);
+        count_error(name, status);
+      }
+      then(status.ok() ? &call->response : nullptr, time);
+      call.reset();  // which holds the channel, and the last to do so must not be gRPC's own thread
+      const std::lock_guard lock(mutex_);
+      --calls_;
+      changed_.notify_all();
+    };
+    Call<Request, Response>& sent = *call;
+    call.reset();
+    (connection_.sessions().async()->*method)(&sent.context, &sent.request, &sent.response,
+                                              std::move(answered));
+  }
+
+  void count_error(const std::string& call, const grpc::Status& status) {
+    if (status.ok()) return;
+    const Problem problem = server_problem(status);
+    ++result_.errors[call + ": " + (problem.reason.empty() ? problem.code : problem.reason)];
+  }
+
+  void create(LoadedSession& session, Clock::time_point due) {
+    v1::CreateSessionRequest request;
+    *request.mutable_session()->mutable_scene() = order_.scene;
+    send<v1::CreateSessionRequest, v1::Session>(
+        &Sessions::async_interface::CreateSession, "create", request,
+        [this, &session, due](const v1::Session* answer, Clock::time_point time) {
+          {
+            const std::lock_guard lock(mutex_);
+            result_.create.add(Seconds(time - due).count());
+            if (answer == nullptr) return;
+            session.session.set_name(answer->name());
+            session.session.set_uid(answer->uid());
+            session.frame_step_s = answer->scene().solver().frame_step_s();
+            session.openings = order_.subscribers;
+            ++result_.sessions;
+            if (closing_) return;
+          }
+          subscribe(session);
+          if (order_.subscribers == 0) begin(session);
+        });
+  }
+
+  void subscribe(LoadedSession& session) {
+    for (int i = 0; i < order_.subscribers; ++i) {
+      Subscriber* subscriber = nullptr;
+      {
+        const std::lock_guard lock(mutex_);
+        session.subscribers.push_back(std::make_unique<Subscriber>(*this, session, i));
+        subscriber = session.subscribers.back().get();
+        ++streams_;
+      }
+      const int stream = session.index * order_.subscribers + i;
+      const auto place = static_cast<std::size_t>(stream / kStreamsOfAConnection);
+      subscriber->start(stream_connections_[place]->frames());
+    }
+  }
+
+  // The session begins when all its subscribers are there.
+  void note_opening(LoadedSession& session) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (--session.openings > 0 || closing_) return;
+    }
+    begin(session);
+  }
+
+  void begin(LoadedSession& session) {
+    if (order_.drive == Drive::kStepped) {
+      const std::lock_guard lock(mutex_);
+      session.origin = Clock::now();
+      await_step(session, 1);
+      return;
+    }
+    v1::RunSessionRequest request;
+    request.set_name(session.session.name());
+    if (order_.drive == Drive::kPaced)
+      request.set_time_scale(order_.rate_per_s * session.frame_step_s);
+    if (order_.frames) request.set_until_frame(*order_.frames);
+    send<v1::RunSessionRequest, v1::RunSessionResponse>(
+        &Sessions::async_interface::RunSession, "run", request,
+        [this, &session](const v1::RunSessionResponse* answer, Clock::time_point time) {
+          const std::lock_guard lock(mutex_);
+          if (answer != nullptr) session.origin = std::min(session.origin, time);
+        });
+  }
+
+  // The step goes out when it is due, or at once where the one before was answered late.
+  void await_step(LoadedSession& session, std::int64_t step) {
+    if (order_.frames && step > *order_.frames) return;
+    agenda_.push({due_time(session, step), &session, step});
+    changed_.notify_all();
+  }
+
+  void step(LoadedSession& session, std::int64_t step) {
+    v1::StepSessionRequest request;
+    request.set_name(session.session.name());
+    send<v1::StepSessionRequest, v1::StepSessionResponse>(
+        &Sessions::async_interface::StepSession, "step", request,
+        [this, &session, step](const v1::StepSessionResponse* answer, Clock::time_point time) {
+          const std::lock_guard lock(mutex_);
+          add_latency(result_.step, session, step, time);
+          session.steps = step;
+          if (answer != nullptr) session.last_frame = answer->frame();
+          if (!closing_) await_step(session, step + 1);
+        });
+  }
+
+  Clock::time_point due_time(const LoadedSession& session, std::int64_t frame) const {
+    return session.origin + ticks(interval() * static_cast<double>(frame));
+  }
+
+  // Frames due by that time.
+  std::int64_t frames_due(const LoadedSession& session, Clock::time_point time) const {
+    if (order_.drive == Drive::kFree || session.origin >= time) return 0;
+    const auto due = static_cast<std::int64_t>(Seconds(time - session.origin) / interval());
+    return order_.frames ? std::min(due, *order_.frames) : due;
+  }
+
+  void add_latency(Latencies& latencies, const LoadedSession& session, std::int64_t frame,
+                   Clock::time_point time, std::int64_t count = 1) const {
+    const auto due = due_time(session, frame);
+    if (due >= measured_from_) latencies.add(Seconds(time - due).count(), count);
+  }
+
+  void receive(LoadedSession& session, Subscriber& subscriber, const v1::Frame& frame,
+               Clock::time_point time) {
+    const std::int64_t number = frame.number();
+    if (order_.on_frame) order_.on_frame(session.index, subscriber.index(), frame);
+
+    const std::lock_guard lock(mutex_);
+    ++result_.frames_received;
+    if (number < subscriber.next_frame) {
+      ++result_.frames_doubled;
+      return;
+    }
+    result_.frames_lost += number - subscriber.next_frame;
+    subscriber.next_frame = number + 1;
+    if (subscriber.index() == 0) result_.substeps += frame.stats().substep_count();
+    if (order_.drive != Drive::kFree) {
+      session.origin =
+          std::min(session.origin, time - ticks(interval() * static_cast<double>(number)));
+      add_latency(result_.frame, session, number, time);
+    }
+    if (closing_ || number == order_.frames) changed_.notify_all();
+  }
+
+  void end_stream(Subscriber& subscriber, const grpc::Status& status) {
+    const std::lock_guard lock(mutex_);
+    if (!cancelled_) count_error("stream", status);
+    subscriber.ended = true;
+    --streams_;
+    changed_.notify_all();
+  }
+
+  // Learns how far each session came, so that what is missing can be told.
+  void stop_sessions() {
+    if (order_.drive == Drive::kStepped) return;  // the steps' answers say it
+    for (LoadedSession* session : created()) {
+      v1::PauseSessionRequest request;
+      request.set_name(session->session.name());
+      send<v1::PauseSessionRequest, v1::PauseSessionResponse>(
+          &Sessions::async_interface::PauseSession, "pause", request,
+          [this, session](const v1::PauseSessionResponse* answer, Clock::time_point) {
+            const std::lock_guard lock(mutex_);
+            if (answer != nullptr) session->last_frame = answer->applied_frame() - 1;
+          });
+    }
+  }
+
+  std::vector<LoadedSession*> created() {
+    const std::lock_guard lock(mutex_);
+    std::vector<LoadedSession*> created;
+    for (LoadedSession& session : sessions_) {
+      if (!session.session.name().empty()) created.push_back(&session);
+    }
+    return created;
+  }
+
+  // With the mutex held; before the sessions are stopped: all that they shall ever have.
+  bool all_received() const {
+    for (const LoadedSession& session : sessions_) {
+      if (!closing_ && session.subscribers.empty()) return false;
+      const auto last = closing_ ? session.last_frame : order_.frames;
+      for (const auto& subscriber : session.subscribers) {
+        if (!subscriber->ended && last && subscriber->next_frame <= *last) return false;
+      }
+    }
+    return true;
+  }
+
+  void count_missing() {
+    result_.frames_due = 0;
+    for (const LoadedSession& session : sessions_) {
+      const std::int64_t due = frames_due(session, end_);
+      result_.frames_due += due * order_.subscribers;
+      std::int64_t computed = session.last_frame.value_or(0);
+      for (const auto& subscriber : session.subscribers)
+        computed = std::max(computed, subscriber->next_frame - 1);
+      for (const auto& subscriber : session.subscribers)
+        result_.frames_lost += computed + 1 - subscriber->next_frame;
+      for (std::int64_t frame = computed + 1; frame <= due; ++frame) {
+        add_latency(result_.frame, session, frame, end_, order_.subscribers);
+        if (order_.drive == Drive::kStepped && frame > session.steps)
+          add_latency(result_.step, session, frame, end_);
+      }
+    }
+  }
+
+  void remove_all() {
+    std::vector<Subscriber*> subscribers;
+    {
+      const std::lock_guard lock(mutex_);
+      cancelled_ = true;
+      for (const LoadedSession& session : sessions_) {
+        for (const auto& subscriber : session.subscribers) subscribers.push_back(subscriber.get());
+      }
+    }
+    for (Subscriber* subscriber : subscribers) subscriber->cancel();
+    wait_until(Clock::time_point::max(), [&] { return calls_ == 0 && streams_ == 0; });
+
+    for (const LoadedSession* session : created()) {
+      v1::DeleteSessionRequest request;
+      request.set_name(session->session.name());
+      request.set_allow_missing(true);
+      send<v1::DeleteSessionRequest, v1::DeleteSessionResponse>(
+          &Sessions::async_interface::DeleteSession, "delete", request,
+          [](const v1::DeleteSessionResponse*, Clock::time_point) {});
+    }
+    wait_until(Clock::time_point::max(), [&] { return calls_ == 0; });
+  }
+
+  Connection& connection_;
+  const LoadOrder& order_;
+  const std::function<void(const LoadResult&)>& progress_;
+  std::vector<std::unique_ptr<Connection>> stream_connections_;
+  Clock::time_point start_, measured_from_;
+
+  std::mutex mutex_;  // guards all below
+  std::condition_variable changed_;
+  std::priority_queue<Due> agenda_;
+  std::vector<LoadedSession> sessions_;
+  Clock::time_point end_;
+  LoadResult result_;
+  std::int64_t calls_ = 0;    // under way
+  std::int64_t streams_ = 0;  // open
+  bool closing_ = false;      // nothing more is begun
+  bool cancelled_ = false;    // the streams, by ourselves
+};
+
+}  // namespace
+
+std::int64_t LoadResult::error_count() const {
+  std::int64_t count = 0;
+  for (const auto& [reason, number] : errors) count += number;
+  return count;
+}
+
+LoadResult apply_load(Connection& connection, const LoadOrder& order,
+                      const std::function<void(const LoadResult&)>& progress) {
+  return Load(connection, order, progress).apply();
+}
+
+int find_limit(Connection& connection, LoadOrder order, const LimitSearch& search,
+               const std::function<void(const Probe&)>& tried,
+               const std::function<void(int, const LoadResult&)>& progress) {
+  const auto holds = [&](int sessions) {
+    order.sessions = sessions;
+    Probe probe{.sessions = sessions, .result = {}};
+    probe.result = apply_load(connection, order, [&](const LoadResult& so_far) {
+      if (progress) progress(sessions, so_far);
+    });
+    probe.holds = probe.result.clean() && probe.result.frame.quantile(0.99) <= search.target_s;
+    tried(probe);
+    return probe.holds;
+  };
+  const auto stopped = [&] { return connection.stop().stop_requested(); };
+
+  int held = 0;
+  int broken = search.most + 1;
+  for (int next = search.first; next > held && next < broken && !stopped();) {
+    (holds(next) ? held : broken) = next;
+    next = broken > search.most ? std::min(2 * held, search.most) : held + (broken - held) / 2;
+    if (broken <= search.most && broken - held <= held / 20) break;
+  }
+  return held;
+}
+
+}  // namespace weft::client

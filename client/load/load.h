@@ -1,0 +1,89 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "client/connection.h"
+#include "client/load/latencies.h"
+
+namespace weft::client {
+
+// What makes the sessions of a load advance.
+enum class Drive {
+  kPaced,    // they run by themselves at the rate
+  kStepped,  // a call for every frame, due at the rate
+  kFree,     // they run as fast as they can and their subscribers read; no frame is due
+};
+
+// Sessions that each publish frames at a given rate, whether or not the server keeps up, and
+// subscribers that receive all of them.
+struct LoadOrder {
+  v1::Scene scene;
+  int sessions = 10;
+  int subscribers = 1;  // of each session
+  Drive drive = Drive::kPaced;
+  double rate_per_s = 60;                      // frames a second of each session
+  std::optional<std::int64_t> frames{};        // of each session, if it shall end after them
+  std::chrono::duration<double> ramp{1};       // in which the sessions are created, evenly
+  std::chrono::duration<double> duration{10};  // after the ramp
+  std::chrono::duration<double> grace{10};     // for answers and frames under way at the end
+  // Hears of every frame received: of which session and subscriber, from 0. Called from any thread,
+  // for one subscriber in order.
+  std::function<void(int session, int subscriber, const v1::Frame&)> on_frame{};
+};
+
+// Every latency counts from the time at which the call, or the frame, was due: a server that is
+// late with one does not make what waits behind it look prompt. Those due before the end of the
+// ramp are not timed, and those that never came count as they had waited at the end.
+//
+// Frame k is due k intervals after the answer to the call that began the session's run, or earlier
+// where a frame came so early that it must have begun earlier.
+struct LoadResult {
+  Latencies create;
+  Latencies step;   // kStepped
+  Latencies frame;  // to each subscriber; not kFree
+  std::int64_t sessions = 0;
+  std::int64_t frames_due = 0;  // by the end, of all subscribers; not kFree
+  std::int64_t frames_received = 0;
+  std::int64_t frames_lost = 0;                // computed, but never received
+  std::int64_t frames_doubled = 0;             // received again, or out of order
+  std::int64_t substeps = 0;                   // that the sessions' frames took
+  std::map<std::string, std::int64_t> errors;  // by call and reason, "step: SOLVER_FAILED"
+  std::chrono::duration<double> wall{};        // until sessions were stopped
+  std::chrono::duration<double> cpu{};         // of this process, in that time
+
+  std::int64_t error_count() const;
+  // Whether nothing was lost, doubled or refused.
+  bool clean() const { return frames_lost + frames_doubled + error_count() == 0; }
+};
+
+// Calls `progress` twice a second. A stop of the connection ends it early; the sessions are deleted
+// in any case.
+LoadResult apply_load(Connection& connection, const LoadOrder& order,
+                      const std::function<void(const LoadResult&)>& progress = {});
+
+// Loads of different numbers of sessions, to find the largest that a server holds.
+struct LimitSearch {
+  int first = 10;  // to be tried
+  int most = 10'000;
+  double target_s = 0;  // that 99 of 100 frames do not exceed
+};
+
+struct Probe {
+  int sessions = 0;
+  LoadResult result;
+  bool holds = false;  // clean, and within the target
+};
+
+// The largest number of sessions that held, within 5 %; 0: not even one. Doubles the number until
+// one does not hold, then halves the interval. `order` says all but the number; `tried` hears of
+// every load.
+int find_limit(Connection& connection, LoadOrder order, const LimitSearch& search,
+               const std::function<void(const Probe&)>& tried,
+               const std::function<void(int sessions, const LoadResult&)>& progress = {});
+
+}  // namespace weft::client

@@ -53,7 +53,8 @@ Connection::Connection(std::unique_ptr<Embedded> server, std::string address,
       address_(std::move(address)),
       stop_(std::move(stop)),
       stubs_(v1::SessionService::NewStub(channel), v1::FrameService::NewStub(channel),
-             v1::TextileService::NewStub(channel), v1::ServerService::NewStub(channel)) {}
+             v1::TextileService::NewStub(channel), v1::ServerService::NewStub(channel),
+             v1::LabService::NewStub(channel)) {}
 
 Connection::~Connection() = default;
 

@@ -9,6 +9,7 @@
 
 #include "client/problem.h"
 #include "weft/v1/frame.grpc.pb.h"
+#include "weft/v1/lab.grpc.pb.h"
 #include "weft/v1/server.grpc.pb.h"
 #include "weft/v1/session.grpc.pb.h"
 #include "weft/v1/textile.grpc.pb.h"
@@ -46,6 +47,7 @@ class Connection {
   v1::FrameService::Stub& frames() {
     return *std::get<std::unique_ptr<v1::FrameService::Stub>>(stubs_);
   }
+  v1::LabService::Stub& lab() { return *std::get<std::unique_ptr<v1::LabService::Stub>>(stubs_); }
   const std::stop_token& stop() const { return stop_; }
 
   // Throws what is wrong, if anything.
@@ -60,7 +62,8 @@ class Connection {
   std::string address_;
   std::stop_token stop_;
   std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,
-             std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>>
+             std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>,
+             std::unique_ptr<v1::LabService::Stub>>
       stubs_;
 };
 

@@ -63,7 +63,8 @@ struct Axis {
     return places;
   }
   std::string label(double place) const {
-    return logarithm ? fmt::format("{:.3g}", std::pow(10, place)) : fmt::format("{:.6g}", place);
+    return logarithm ? fmt::format("{:.3g}", std::pow(10, place))
+                     : fmt::format("{:.6g}", place + 0.0);  // no -0
   }
 };
 

@@ -64,7 +64,8 @@ Connection::Connection(std::shared_ptr<Embedded> server, std::string address,
       stop_(std::move(stop)),
       channel_(std::move(channel)),
       stubs_(v1::SessionService::NewStub(channel_), v1::FrameService::NewStub(channel_),
-             v1::TextileService::NewStub(channel_), v1::ServerService::NewStub(channel_)) {}
+             v1::TextileService::NewStub(channel_), v1::ServerService::NewStub(channel_),
+             v1::LabService::NewStub(channel_)) {}
 
 Connection::~Connection() = default;
 

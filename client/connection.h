@@ -10,6 +10,7 @@
 
 #include "client/problem.h"
 #include "weft/v1/frame.grpc.pb.h"
+#include "weft/v1/lab.grpc.pb.h"
 #include "weft/v1/server.grpc.pb.h"
 #include "weft/v1/session.grpc.pb.h"
 #include "weft/v1/textile.grpc.pb.h"
@@ -54,6 +55,7 @@ class Connection {
   v1::FrameService::Stub& frames() {
     return *std::get<std::unique_ptr<v1::FrameService::Stub>>(stubs_);
   }
+  v1::LabService::Stub& lab() { return *std::get<std::unique_ptr<v1::LabService::Stub>>(stubs_); }
   const std::stop_token& stop() const { return stop_; }
 
   // Waits until the server can be reached, at most so long. Between calls nobody works on that.
@@ -72,7 +74,8 @@ class Connection {
   std::stop_token stop_;
   std::shared_ptr<grpc::Channel> channel_;
   std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,
-             std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>>
+             std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>,
+             std::unique_ptr<v1::LabService::Stub>>
       stubs_;
 };
 

@@ -41,14 +41,11 @@ std::string place_in_file(std::string field) {
   return field;
 }
 
-}  // namespace
-
-v1::Scene read_scene(const std::string& path) {
+void read(const std::string& path, google::protobuf::Message& into) {
   const std::string text = read_text(path);
   check_syntax(path, text);
-  v1::Scene scene;
-  const auto status = google::protobuf::util::JsonStringToMessage(text, &scene);
-  if (status.ok()) return scene;
+  const auto status = google::protobuf::util::JsonStringToMessage(text, &into);
+  if (status.ok()) return;
 
   // protobuf says "(sheets[0].grid) rowz: Cannot find field."
   constexpr std::string_view kUnknown = ": Cannot find field.";
@@ -59,6 +56,20 @@ v1::Scene read_scene(const std::string& path) {
   if (place.starts_with('('))
     place = fmt::format("{}.{}", place.substr(1, place.find(')') - 1), word);
   throw malformed(path + line_of(word, text), "no such field: " + place);
+}
+
+}  // namespace
+
+v1::Scene read_scene(const std::string& path) {
+  v1::Scene scene;
+  read(path, scene);
+  return scene;
+}
+
+v1::Textile read_textile(const std::string& path) {
+  v1::Textile textile;
+  read(path, textile);
+  return textile;
 }
 
 v1::Session create_session(Connection& connection, const v1::Scene& scene,

@@ -65,6 +65,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_scene(app, context);
   add_session(app, context);
   add_textile(app, context);
+  add_lab(app, context);
   add_run(app, context);
   add_pause(app, context);
   add_step(app, context);

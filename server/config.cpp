@@ -36,6 +36,7 @@ std::vector<Number> numbers(Config& config) {
       {"max_particles", &limits.max_particles_per_session, 4, 1'000'000'000,
        "Particles in one session"},
       {"max_streams", &limits.max_streams, 1, 100'000, "Streams at a time"},
+      {"max_tests", &limits.max_tests, 1, 256, "Tests of textiles at a time"},
       {"history_bytes", &limits.history_bytes_per_session, kMiB, 1024 * kMiB * 64,
        "Bytes of frames that a session keeps for its streams"},
   };

@@ -8,6 +8,7 @@
 
 #include "server/rpc/backend.h"
 #include "server/rpc/frame_service.h"
+#include "server/rpc/lab_service.h"
 #include "server/rpc/metrics.h"
 #include "server/rpc/restore.h"
 #include "server/rpc/server_service.h"
@@ -17,8 +18,12 @@
 namespace weft {
 namespace {
 
-constexpr std::array kServices = {"", "weft.v1.SessionService", "weft.v1.FrameService",
-                                  "weft.v1.ServerService", "weft.v1.TextileService"};
+constexpr std::array kServices = {"",
+                                  "weft.v1.SessionService",
+                                  "weft.v1.FrameService",
+                                  "weft.v1.ServerService",
+                                  "weft.v1.TextileService",
+                                  "weft.v1.LabService"};
 
 // For calls that are answered at once, when gRPC is shut down.
 constexpr std::chrono::milliseconds kGrace{200}, kNoGrace{0};
@@ -57,6 +62,7 @@ struct Server::Parts {
   FrameService frames{backend};
   ServerService server{backend};
   TextileService textiles;
+  LabService lab{backend};
   std::unique_ptr<grpc::Server> grpc;
   std::optional<Metrics> metrics;
   bool stopped = false;
@@ -71,6 +77,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
   builder.RegisterService(&parts_->frames);
   builder.RegisterService(&parts_->server);
   builder.RegisterService(&parts_->textiles);
+  builder.RegisterService(&parts_->lab);
   int port = 0;
   if (options.host) {
     builder.AddListeningPort(*options.host + ":" + std::to_string(options.port),
@@ -115,6 +122,7 @@ void Server::stop(std::chrono::milliseconds deadline) {
   parts_->frames.drain();
   parts_->backend.registry.close(Refusal::Why::kDraining);
   parts_->sessions.drain();
+  parts_->lab.drain();
   const bool ended = parts_->backend.calls.wait_for_none(end);
   parts_->grpc->Shutdown(std::chrono::system_clock::now() + (ended ? kGrace : kNoGrace));
 }

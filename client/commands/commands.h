@@ -12,6 +12,7 @@ namespace weft::client {
 void add_scene(CLI::App& app, Context& context);
 void add_session(CLI::App& app, Context& context);
 void add_textile(CLI::App& app, Context& context);
+void add_lab(CLI::App& app, Context& context);
 void add_run(CLI::App& app, Context& context);
 void add_pause(CLI::App& app, Context& context);
 void add_step(CLI::App& app, Context& context);

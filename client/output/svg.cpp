@@ -10,8 +10,9 @@
 namespace weft::client {
 namespace {
 
-constexpr double kWidth = 720, kHeight = 480;
-constexpr double kLeft = 80, kRight = 24, kTop = 44, kBottom = 56;
+constexpr double kWidth = 920, kHeight = 480;
+constexpr double kLeft = 80, kRight = 224,  // the names stand there
+    kTop = 44, kBottom = 56;
 constexpr std::array kColours = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd",
                                  "#ff7f0e", "#17becf", "#8c564b", "#7f7f7f"};
 
@@ -29,9 +30,11 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-// A range, and places in it at 1, 2 or 5 times a power of ten.
+// A range, and places in it at 1, 2 or 5 times a power of ten; of a logarithm: at the powers
+// themselves, between them too where they are few.
 struct Axis {
   double low = 0, high = 1;
+  bool logarithm = false;
 
   void widen() {
     const double margin = high > low ? 0.05 * (high - low) : 0.05 * std::abs(low) + 1e-12;
@@ -46,10 +49,22 @@ struct Axis {
   }
   std::vector<double> ticks() const {
     std::vector<double> places;
+    if (logarithm) {
+      const bool few = high - low < 2.5;
+      for (double power = std::floor(low); power <= high; ++power)
+        for (const double factor : {1.0, 2.0, 5.0})
+          if (const double place = power + std::log10(factor);
+              place >= low && place <= high && (few || factor == 1))
+            places.push_back(place);
+      return places;
+    }
     const double by = step();
-    for (double k = std::ceil(low / by); k * by <= high; ++k)
-      places.push_back(k * by + 0.0);  // not -0
+    for (double k = std::ceil(low / by); k * by <= high; ++k) places.push_back(k * by);
     return places;
+  }
+  std::string label(double place) const {
+    return logarithm ? fmt::format("{:.3g}", std::pow(10, place))
+                     : fmt::format("{:.6g}", place + 0.0);  // no -0
   }
 };
 
@@ -58,8 +73,9 @@ std::pair<Axis, Axis> axes_of(const Plot& plot) {
   bool first = true;
   for (const Series& series : plot.series) {
     for (const auto& [px, py] : series.points) {
-      x = first ? Axis{px, px} : Axis{std::min(x.low, px), std::max(x.high, px)};
-      y = first ? Axis{py, py} : Axis{std::min(y.low, py), std::max(y.high, py)};
+      const bool log = plot.logarithmic;
+      x = first ? Axis{px, px, log} : Axis{std::min(x.low, px), std::max(x.high, px), log};
+      y = first ? Axis{py, py, log} : Axis{std::min(y.low, py), std::max(y.high, py), log};
       first = false;
     }
   }
@@ -73,9 +89,24 @@ std::pair<Axis, Axis> axes_of(const Plot& plot) {
   return {x, y};
 }
 
+// The plot with logarithms for points, as far as they have them.
+Plot drawn(Plot plot) {
+  if (!plot.logarithmic) return plot;
+  for (Series& series : plot.series) {
+    std::erase_if(series.points,
+                  [](const auto& point) { return !(point.first > 0 && point.second > 0); });
+    for (auto& [x, y] : series.points) {
+      x = std::log10(x);
+      y = std::log10(y);
+    }
+  }
+  return plot;
+}
+
 }  // namespace
 
-std::string svg_text(const Plot& plot) {
+std::string svg_text(const Plot& given) {
+  const Plot plot = drawn(given);
   const auto [x_axis, y_axis] = axes_of(plot);
   const auto place_x = [&, x = x_axis](double value) {
     return kLeft + (value - x.low) / (x.high - x.low) * (kWidth - kLeft - kRight);
@@ -97,8 +128,8 @@ std::string svg_text(const Plot& plot) {
     const double x = place_x(tick);
     fmt::format_to(out,
                    "<path d=\"M{0:.2f} {1}V{2}\" stroke=\"#ddd\"/>"
-                   "<text x=\"{0:.2f}\" y=\"{3}\" text-anchor=\"middle\">{4:.6g}</text>\n",
-                   x, kTop, bottom, bottom + 18, tick);
+                   "<text x=\"{0:.2f}\" y=\"{3}\" text-anchor=\"middle\">{4}</text>\n",
+                   x, kTop, bottom, bottom + 18, x_axis.label(tick));
   }
   Axis upright = y_axis;
   if (upright.low > upright.high) std::swap(upright.low, upright.high);
@@ -106,8 +137,8 @@ std::string svg_text(const Plot& plot) {
     const double y = place_y(tick);
     fmt::format_to(out,
                    "<path d=\"M{1} {0:.2f}H{2}\" stroke=\"#ddd\"/>"
-                   "<text x=\"{3}\" y=\"{4:.2f}\" text-anchor=\"end\">{5:.6g}</text>\n",
-                   y, kLeft, right, kLeft - 6, y + 4, tick);
+                   "<text x=\"{3}\" y=\"{4:.2f}\" text-anchor=\"end\">{5}</text>\n",
+                   y, kLeft, right, kLeft - 6, y + 4, upright.label(tick));
   }
   fmt::format_to(out,
                  "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"none\" "
@@ -136,9 +167,8 @@ std::string svg_text(const Plot& plot) {
     const double y = kTop + 18 + 17 * static_cast<double>(s);
     fmt::format_to(out,
                    "<path d=\"M{0} {1}h22\" stroke=\"{2}\" stroke-width=\"2\"/>"
-                   "<text x=\"{3}\" y=\"{4}\" stroke=\"white\" stroke-width=\"4\" "
-                   "paint-order=\"stroke\">{5}</text>\n",
-                   right - 230, y - 4, colour, right - 202, y, escaped(series.name));
+                   "<text x=\"{3}\" y=\"{4}\">{5}</text>\n",
+                   right + 12, y - 4, colour, right + 40, y, escaped(series.name));
   }
   return svg + "</svg>\n";
 }

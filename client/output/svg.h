@@ -16,11 +16,12 @@ struct Plot {
   std::string title;
   std::string x_label, y_label;
   std::vector<Series> series;
-  bool points = false;     // marks on the lines
-  bool downwards = false;  // y grows downwards, in the measure of x
+  bool points = false;       // marks on the lines
+  bool downwards = false;    // y grows downwards, in the measure of x
+  bool logarithmic = false;  // both axes; points that are not above 0 are left out
 };
 
-// The plot as an SVG document of 720 x 480.
-std::string svg_text(const Plot& plot);
+// The plot as an SVG document of 920 x 480.
+std::string svg_text(const Plot& given);
 
 }  // namespace weft::client

@@ -123,7 +123,7 @@ Equilibrium find_equilibrium(const Mesh& mesh, const Eigen::ArrayXi& held, const
     Sparse matrix = statics.stiffness(result.x);
     const double scale = matrix.diagonal().maxCoeff();
     bool moved = false;
-    for (int k = 0; k < kTries && !moved; ++k) {
+    for (int k = 0; k < kTries && !moved && !stop.stop_requested(); ++k) {
       // a direction downhill: the matrix is shifted until it is positive
       Sparse shifted = matrix;
       for (int i = 0; i < statics.unknowns(); ++i) shifted.coeffRef(i, i) += shift + 1e-14 * scale;

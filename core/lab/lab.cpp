@@ -73,6 +73,17 @@ LabValue value(const std::string& quantity, const std::string& unit, const Speci
           asked,    found};
 }
 
+// Puts each specimen to the test, until a stop.
+template <class Specimens, class Test>
+void for_each_specimen(const Specimens& specimens, const LabWatch& watch, const Test& test) {
+  int done = 0;
+  for (const auto& specimen : specimens) {
+    if (watch.stop.stop_requested()) return;
+    if (watch.progress) watch.progress(done++, static_cast<int>(specimens.size()));
+    test(specimen);
+  }
+}
+
 void note_unsettled(const Equilibrium& rest, double tolerance, LabReport& report) {
   if (!rest.found)
     report.notes.push_back(join("at rest only up to ", rest.residual, " N, not the ", tolerance,
@@ -109,7 +120,7 @@ void pull(const MeasuredTextile& textile, const LabOrder& order, double spacing,
       value("modulus, clamped width", "N/m", specimen, textile.tensile_warp, clamped));
 }
 
-LabReport tensile(const LabOrder& order, const std::stop_token& stop) {
+LabReport tensile(const LabOrder& order, const LabWatch& watch) {
   const MeasuredTextile textile = along_warp(order);
   LabReport report;
   report.method =
@@ -118,7 +129,8 @@ LabReport tensile(const LabOrder& order, const std::stop_token& stop) {
       "clamped: its width is held.";
   const std::vector<double> spacings =
       order.spacings.empty() ? std::vector{0.025, 0.0125, 0.00625} : order.spacings;
-  for (const double spacing : spacings) pull(textile, order, spacing, stop, report);
+  for_each_specimen(spacings, watch,
+                    [&](double spacing) { pull(textile, order, spacing, watch.stop, report); });
   if (2 * textile.shear > 0.1 * textile.tensile_warp)
     report.notes.push_back(join("held at its width it measures E + 2 G, ",
                                 textile.tensile_warp + 2 * textile.shear,
@@ -127,7 +139,7 @@ LabReport tensile(const LabOrder& order, const std::stop_token& stop) {
 }
 
 // Frames of 0.1 m, hinged at the corners, sheared by 1 degree.
-LabReport shear(const LabOrder& order) {
+LabReport shear(const LabOrder& order, const LabWatch& watch) {
   constexpr double kSide = 0.1, kAngle = std::numbers::pi / 180;
   const MeasuredTextile textile = along_warp(order);
   LabReport report;
@@ -136,7 +148,7 @@ LabReport shear(const LabOrder& order) {
       "over area and angle squared, times 2. Asked: the shear stiffness given.";
   const std::vector<double> spacings =
       order.spacings.empty() ? std::vector{0.02, 0.01, 0.005} : order.spacings;
-  for (const double spacing : spacings) {
+  for_each_specimen(spacings, watch, [&](double spacing) {
     const int side = steps_of(kSide, spacing) + 1;
     Specimen specimen = cut(textile, order.bending, side, side, spacing);
     // rows lean, their length and that of the columns stay
@@ -147,7 +159,7 @@ LabReport shear(const LabOrder& order) {
     const double area = std::pow((side - 1) * spacing, 2);
     report.values.push_back(value("shear stiffness", "N/m per radian", specimen, textile.shear,
                                   2 * energy / (area * kAngle * kAngle)));
-  }
+  });
   const auto* law = std::get_if<ChoiKo>(&order.bending);
   if (law != nullptr && law->diagonal_bend)
     report.notes.emplace_back(
@@ -158,7 +170,7 @@ LabReport shear(const LabOrder& order) {
 }
 
 // Figure 2 of the paper, for a connection of this textile along the specimen.
-LabReport bending_curve(const LabOrder& order) {
+LabReport bending_curve(const LabOrder& order, const LabWatch& watch) {
   constexpr int kPoints = 201;
   const MeasuredTextile textile = along_warp(order);
   const auto& law = std::get<ChoiKo>(order.bending);
@@ -168,7 +180,7 @@ LabReport bending_curve(const LabOrder& order) {
       "with the clamp (eq. 5), and as the evaluator gives it. Asked: f_b* by the exact curve; "
       "found: the evaluator's, where they are farthest apart.";
   const std::vector<double> spacings = order.spacings.empty() ? std::vector{0.02} : order.spacings;
-  for (const double spacing : spacings) {
+  for_each_specimen(spacings, watch, [&](double spacing) {
     const Specimen specimen = cut(textile, order.bending, 5, 5, spacing);
     const LatticeConstants k = lattice_constants(specimen.sheet);
     ChoiKo truth = law;
@@ -201,7 +213,7 @@ LabReport bending_curve(const LabOrder& order) {
       report.notes.push_back(join("at a spacing of ", 1000 * spacing,
                                   " mm it bends as f_b says above a curvature of ",
                                   exact.least_curvature(), " 1/m"));
-  }
+  });
   return report;
 }
 
@@ -309,7 +321,7 @@ std::vector<int> cantilever_columns(const LabOrder& order, double overhang) {
   return columns;
 }
 
-LabReport cantilever(const LabOrder& order, const std::stop_token& stop) {
+LabReport cantilever(const LabOrder& order, const LabWatch& watch) {
   const MeasuredTextile textile = along_warp(order);
   const double overhang = overhang_of(textile);
   LabReport report;
@@ -318,8 +330,10 @@ LabReport cantilever(const LabOrder& order, const std::stop_token& stop) {
       " mm that its bending rigidity and weight call for. Asked: the angle of the chord from edge "
       "to tip by the heavy elastica, without stretch. The edge lies half a spacing inside the last "
       "column held, and the spacing divides the overhang.");
-  for (const int columns : cantilever_columns(order, overhang))
-    hang_over(textile, order, overhang, columns, stop, report);
+  for_each_specimen(cantilever_columns(order, overhang), watch, [&](int columns) {
+    hang_over(textile, order, overhang, columns, watch.stop, report);
+  });
+  if (watch.stop.stop_requested()) return report;
   report.curves.push_back({"heavy elastica", {"x m", "drop m"}, {}});
   const Eigen::Matrix2Xd shape = heavy_elastica(kCantileverQ, 101);
   for (const Eigen::Vector2d point : shape.colwise())
@@ -342,7 +356,7 @@ LabReport cantilever(const LabOrder& order, const std::stop_token& stop) {
 }
 
 // Threads 0.3 m long between hooks 0.24 m apart.
-LabReport chain(const LabOrder& order, const std::stop_token& stop) {
+LabReport chain(const LabOrder& order, const LabWatch& watch) {
   constexpr double kLength = 0.3, kSpan = 0.24;
   MeasuredTextile threads = along_warp(order);
   threads.shear = threads.bend_rigidity_warp = threads.bend_rigidity_weft = 0;
@@ -352,7 +366,7 @@ LabReport chain(const LabOrder& order, const std::stop_token& stop) {
       "stiffness alone. Asked: the sag of the elastic catenary.";
   const std::vector<double> spacings =
       order.spacings.empty() ? std::vector{0.06, 0.03, 0.015, 0.0075} : order.spacings;
-  for (const double wanted : spacings) {
+  for_each_specimen(spacings, watch, [&](double wanted) {
     const int pairs = std::max(1, static_cast<int>(std::lround(kLength / wanted / 2)));
     const double spacing = kLength / (2 * pairs);
     Specimen specimen = cut(threads, Isometric{}, 2, 2 * pairs + 1, spacing);
@@ -367,12 +381,13 @@ LabReport chain(const LabOrder& order, const std::stop_token& stop) {
     specimen.hold_column(0);
     specimen.hold_column(2 * pairs);
     const double tolerance = 1e-7 * weight * spacing;
-    const Equilibrium rest = find_equilibrium(
-        specimen.mesh, specimen.held, {0, -kStandardGravity, 0}, specimen.start, tolerance, stop);
+    const Equilibrium rest =
+        find_equilibrium(specimen.mesh, specimen.held, {0, -kStandardGravity, 0}, specimen.start,
+                         tolerance, watch.stop);
     note_unsettled(rest, tolerance, report);
     report.values.push_back(
         value("sag", "m", specimen, shape(1, pairs), -rest.x(1, specimen.at(0, pairs))));
-  }
+  });
   return report;
 }
 
@@ -439,20 +454,20 @@ std::vector<Problem> find_problems(const LabOrder& order) {
   return problems;
 }
 
-LabReport run_lab(const LabOrder& order, const std::stop_token& stop) {
+LabReport run_lab(const LabOrder& order, const LabWatch& watch) {
   switch (order.test) {
     case LabTest::kTensile:
-      return tensile(order, stop);
+      return tensile(order, watch);
     case LabTest::kShear:
-      return shear(order);
+      return shear(order, watch);
     case LabTest::kBending:
-      return bending_curve(order);
+      return bending_curve(order, watch);
     case LabTest::kChain:
-      return chain(order, stop);
+      return chain(order, watch);
     case LabTest::kCantilever:
       break;
   }
-  return cantilever(order, stop);
+  return cantilever(order, watch);
 }
 
 }  // namespace weft

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -52,7 +53,13 @@ struct LabReport {
 // Everything that keeps a test from being run; empty for a good one. Fields as in RunTestRequest.
 std::vector<Problem> find_problems(const LabOrder& order);
 
-// Precondition: find_problems(order) is empty. On a stop it ends early, with what it has.
-LabReport run_lab(const LabOrder& order, const std::stop_token& stop = {});
+// Who waits for a test.
+struct LabWatch {
+  std::stop_token stop;
+  std::function<void(int done, int specimens)> progress;  // told before each specimen; or empty
+};
+
+// Precondition: find_problems(order) is empty. On a stop it ends soon, with what it has.
+LabReport run_lab(const LabOrder& order, const LabWatch& watch = {});
 
 }  // namespace weft

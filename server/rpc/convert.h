@@ -6,8 +6,10 @@
 #include <variant>
 #include <vector>
 
+#include "core/lab/lab.h"
 #include "core/simulation.h"
 #include "server/session/session.h"
+#include "weft/v1/lab.pb.h"
 #include "weft/v1/session.pb.h"
 
 // Between the words of the interface (weft::v1) and those of the solver.
@@ -27,6 +29,9 @@ Converted<Textile> to_textile(const v1::Textile& textile, const std::string& fie
 Converted<Textile> merge_textile(const Textile& current, const v1::Textile& change,
                                  const google::protobuf::FieldMask& mask);
 
+// A test that can be run.
+Converted<LabOrder> to_lab_order(const v1::RunTestRequest& request);
+
 enum class StartValues { kIncluded, kLeftOut };
 
 // With every default filled in.
@@ -39,6 +44,7 @@ v1::Scene as_given(const Scene& scene);
 
 v1::Plan to_proto(const Plan& plan);
 v1::Repair to_proto(const Repair& repair);
+v1::LabReport to_proto(const LabOrder& order, const LabReport& report);
 v1::SessionState to_proto(SessionState state);
 
 }  // namespace weft

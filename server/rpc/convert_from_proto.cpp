@@ -20,6 +20,8 @@ constexpr std::array kEvaluators = {Evaluator::kLinearized, Evaluator::kSeries, 
 constexpr std::array kIntegrators = {IntegratorKind::kVerlet, IntegratorKind::kVerlet,
                                      IntegratorKind::kEuler, IntegratorKind::kMidpoint,
                                      IntegratorKind::kRk4};
+constexpr std::array kLabTests = {LabTest::kTensile, LabTest::kTensile,    LabTest::kShear,
+                                  LabTest::kBending, LabTest::kCantilever, LabTest::kChain};
 constexpr std::array kPrecisions = {Precision::kSingle, Precision::kSingle, Precision::kDouble};
 
 std::string at(const std::string& field, int index) {
@@ -65,6 +67,7 @@ class Reader {
  public:
   Scene scene(const v1::Scene& from);
   Textile textile(const v1::Textile& from, const std::string& field);
+  LabOrder lab_order(const v1::RunTestRequest& from);
 
   // What was found here, then core's problems, but none with a value that stands in for a missing
   // one.
@@ -269,6 +272,27 @@ SolverSettings Reader::solver(const v1::SolverSettings& from) {
   return solver;
 }
 
+LabOrder Reader::lab_order(const v1::RunTestRequest& from) {
+  LabOrder order;
+  order.test = choice(kLabTests, from.test(), "test");
+  if (from.test() == v1::LAB_TEST_UNSPECIFIED) problem("test", "is absent; give one");
+  if (from.has_textile()) {
+    const Textile read = textile(from.textile(), "textile");
+    if (const auto* measured = std::get_if<MeasuredTextile>(&read.model)) {
+      order.textile = *measured;
+    } else {
+      problem("textile.raw", "describes one mesh; a test takes preset or measured");
+      stand_ins_.emplace_back("textile.");
+    }
+  } else {
+    missing("textile", "a textile", "textile.");
+  }
+  if (from.has_bending()) order.bending = bending(from.bending(), "bending");
+  order.weft = choice(std::array{false, false, true}, from.direction(), "direction");
+  order.spacings = {from.spacings_m().begin(), from.spacings_m().end()};
+  return order;
+}
+
 std::vector<Problem> Reader::with(const std::vector<Problem>& problems) && {
   std::copy_if(
       problems.begin(), problems.end(), std::back_inserter(problems_), [&](const Problem& problem) {
@@ -317,6 +341,14 @@ Converted<Textile> to_textile(const v1::Textile& textile, const std::string& fie
   Reader reader;
   const Textile read = reader.textile(textile, field);
   auto problems = std::move(reader).with(find_problems(read, field));
+  if (problems.empty()) return read;
+  return problems;
+}
+
+Converted<LabOrder> to_lab_order(const v1::RunTestRequest& request) {
+  Reader reader;
+  const LabOrder read = reader.lab_order(request);
+  auto problems = std::move(reader).with(find_problems(read));
   if (problems.empty()) return read;
   return problems;
 }

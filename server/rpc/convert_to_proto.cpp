@@ -266,6 +266,29 @@ v1::Repair to_proto(const Repair& repair) {
   return result;
 }
 
+v1::LabReport to_proto(const LabOrder& order, const LabReport& report) {
+  v1::LabReport result;
+  result.set_method(report.method);
+  *result.mutable_textile() = to_proto(Textile{order.textile}).measured();
+  for (const LabValue& value : report.values) {
+    v1::LabValue* added = result.add_values();
+    added->set_quantity(value.quantity);
+    added->set_unit(value.unit);
+    added->set_spacing_m(value.spacing);
+    added->set_particles(value.particles);
+    added->set_asked(value.asked);
+    added->set_found(value.found);
+  }
+  for (const LabCurve& curve : report.curves) {
+    v1::LabCurve* added = result.add_curves();
+    added->set_name(curve.name);
+    for (const auto& column : curve.columns) added->add_columns(column);
+    for (const auto& row : curve.rows) added->mutable_values()->Add(row.begin(), row.end());
+  }
+  for (const auto& note : report.notes) result.add_notes(note);
+  return result;
+}
+
 v1::SessionState to_proto(SessionState state) {
   switch (state) {
     case SessionState::kRestoring:

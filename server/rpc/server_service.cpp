@@ -23,6 +23,7 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
   limits->set_max_streams(backend_.limits.max_streams);
   limits->set_max_request_bytes(backend_.limits.max_request_bytes);
   limits->set_max_frame_bytes(backend_.limits.max_frame_bytes);
+  limits->set_max_tests(backend_.limits.max_tests);
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(grpc::Status::OK);
   return reactor;

@@ -10,6 +10,7 @@ struct Limits {
   std::int64_t max_particles_per_session = 340'000;   // whose frame fits into max_frame_bytes
   std::int64_t history_bytes_per_session = 64 << 20;  // frames with their encodings
   std::int64_t max_streams = 1024;
+  std::int64_t max_tests = 8;  // that run or wait
   std::int64_t max_request_bytes = 16 << 20;
   std::int64_t max_frame_bytes = 4 << 20;  // gRPC's default receive limit
 };

@@ -65,11 +65,13 @@ std::string number(double value) { return fmt::format("{:.4g}", value); }
 
 int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
-  if (arguments.size() < 3 || arguments[0] != "stability") {
-    std::cerr << "usage: weft-report stability FOLDER COMMIT [--large]\n";
+  const std::string page = arguments.size() < 3 ? "" : arguments[0];
+  if (page != "accuracy" && page != "stability") {
+    std::cerr << "usage: weft-report accuracy|stability FOLDER COMMIT [--large]\n";
     return 2;
   }
   const bool large = arguments.size() > 3 && arguments[3] == "--large";
-  weft::reports::stability(arguments[1], arguments[2], large);
+  const auto write = page == "accuracy" ? weft::reports::accuracy : weft::reports::stability;
+  write(arguments[1], arguments[2], large);
   std::cout << arguments[1] << "/README.md\n";
 }

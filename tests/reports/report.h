@@ -4,9 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "tests/reports/svg.h"
+#include "client/output/svg.h"
 
 namespace weft::reports {
+
+using client::Plot;
+using client::Series;
 
 // A page in a folder: one table of numbers, pictures, and text that says what they are.
 class Page {
@@ -31,7 +34,8 @@ class Page {
 std::string machine(const std::string& commit);
 std::string number(double value);
 
-// Writes a page; `large` for finer meshes and more cases.
+// Each writes a page; `large` for finer meshes and more cases.
+void accuracy(const std::filesystem::path& folder, const std::string& commit, bool large);
 void stability(const std::filesystem::path& folder, const std::string& commit, bool large);
 
 }  // namespace weft::reports

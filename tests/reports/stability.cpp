@@ -82,7 +82,7 @@ class Report {
            const std::vector<std::pair<double, SheetDefinition>>& sheets) {
     page_.text("## " + title);
     std::vector<std::vector<std::string>> rows;
-    Plot plot{title, "log10 of " + name, "log10 of the step in s", {}, true, false};
+    Plot plot{title, name, "step s", {}, true, false, true};
     plot.series = {{"linear bound", {}}, {"estimate", {}}, {"measured", {}}};
     for (const auto& [value, sheet] : sheets) {
       const StepPlan plan = Simulation(scene_of(sheet)).plan().step;
@@ -101,10 +101,9 @@ class Report {
       page_.row(line);
       ratios_.push_back(measured / plan.linear_bound);
       closeness_.push_back(measured / plan.estimated_bound);
-      const double x = std::log10(value);
-      plot.series[0].points.emplace_back(x, std::log10(plan.linear_bound));
-      plot.series[1].points.emplace_back(x, std::log10(plan.estimated_bound));
-      plot.series[2].points.emplace_back(x, std::log10(measured));
+      plot.series[0].points.emplace_back(value, plan.linear_bound);
+      plot.series[1].points.emplace_back(value, plan.estimated_bound);
+      plot.series[2].points.emplace_back(value, measured);
     }
     page_.table({name, "linear bound s", "estimate s", "measured s", "measured / bound",
                  "measured / estimate", "damping ratio"},

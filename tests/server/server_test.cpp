@@ -223,7 +223,7 @@ TEST(Config, HelpsWithEveryFlag) {
   const std::string help = refusal({"--help"});
   for (const char* flag :
        {"--host", "--port", "--config", "--data-dir", "--insecure", "--workers", "--max-sessions",
-        "--max-particles", "--max-streams", "--history-bytes", "--log-level"}) {
+        "--max-particles", "--max-streams", "--max-tests", "--history-bytes", "--log-level"}) {
     EXPECT_THAT(help, HasSubstr(flag));
   }
 }

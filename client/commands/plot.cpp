@@ -80,15 +80,14 @@ void add_curves(Curves& curves, const std::string& path, const FrameRange& wante
 
 // The four plots in two rows.
 std::string sheet_of_plots(const Curves& curves) {
-  constexpr int kWidth = 720;
-  constexpr int kHeight = 480;
   std::string svg =
-      fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\">\n", 2 * kWidth,
-                  2 * kHeight);
+      fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\">\n",
+                  2 * kPlotWidth, 2 * kPlotHeight);
   int place = 0;
   for (const Plot* plot : {&curves.energy, &curves.strain, &curves.speed, &curves.substeps}) {
     svg += fmt::format("<svg x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\">\n{}</svg>\n",
-                       place % 2 * kWidth, place / 2 * kHeight, kWidth, kHeight, svg_text(*plot));
+                       place % 2 * kPlotWidth, place / 2 * kPlotHeight, kWidth, kHeight,
+                       svg_text(*plot));
     ++place;
   }
   return svg + "</svg>\n";

@@ -10,7 +10,7 @@
 namespace weft::client {
 namespace {
 
-constexpr double kWidth = 920, kHeight = 480;
+constexpr double kWidth = kPlotWidth, kHeight = kPlotHeight;
 constexpr double kLeft = 80, kRight = 224,  // the names stand there
     kTop = 44, kBottom = 56;
 constexpr std::array kColours = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd",

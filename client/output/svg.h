@@ -21,7 +21,8 @@ struct Plot {
   bool logarithmic = false;  // both axes; points that are not above 0 are left out
 };
 
-// The plot as an SVG document of 920 x 480.
+inline constexpr int kPlotWidth = 920, kPlotHeight = 480;
+// The plot as an SVG document of that size.
 std::string svg_text(const Plot& given);
 
 }  // namespace weft::client

@@ -86,7 +86,7 @@ std::string sheet_of_plots(const Curves& curves) {
   int place = 0;
   for (const Plot* plot : {&curves.energy, &curves.strain, &curves.speed, &curves.substeps}) {
     svg += fmt::format("<svg x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\">\n{}</svg>\n",
-                       place % 2 * kPlotWidth, place / 2 * kPlotHeight, kWidth, kHeight,
+                       place % 2 * kPlotWidth, place / 2 * kPlotHeight, kPlotWidth, kPlotHeight,
                        svg_text(*plot));
     ++place;
   }

@@ -295,7 +295,7 @@ void add_load(CLI::App& app, Context& context) {
   command->add_option("--drive", order.drive, "What makes sessions advance [paced]")
       ->transform(CLI::CheckedTransformer(drives))
       ->option_text("paced|stepped|free");
-  command->add_option("--rate", options->rate, "Frames a second of each; else the scene's own")
+  command->add_option("--rate", options->rate, "Frames a second [the scene's own]")
       ->type_name("R")
       ->check(CLI::Range(1e-3, 1e5));
   command->add_option("--frames", order.frames, "End when each session has so many")
@@ -311,8 +311,7 @@ void add_load(CLI::App& app, Context& context) {
       ->capture_default_str();
   auto* limit = command->add_flag("--find-limit", options->find_limit,
                                   "Search how many sessions hold --target");
-  command
-      ->add_option("--target", options->target_s, "How late 99 of 100 may be, s; else an interval")
+  command->add_option("--target", options->target_s, "Lateness 99 of 100 may have, s [an interval]")
       ->type_name("S")
       ->check(CLI::PositiveNumber)
       ->needs(limit);

@@ -67,7 +67,7 @@ class Load {
     const Seconds end_cpu = processor_time();
     stop_sessions();
     const auto last = Clock::now() + ticks(order_.grace);
-    wait_until(last, [&] { return calls_ == 0 && (stopped() || all_received()); });
+    wait_until(last, [&] { return calls_ == 0 && all_received(); });
     {
       const std::lock_guard lock(mutex_);
       count_missing();

@@ -50,6 +50,11 @@ TEST_F(LoadTest, EverySubscriberReceivesEveryFrameOnceHoweverSessionsAdvance) {
   }
 }
 
+// From the first frame that was due to the end, s: what a frame waits at most.
+double whole_time(const client::LoadResult& result, const client::LoadOrder& order) {
+  return static_cast<double>(result.frames_due) / order.rate_per_s;
+}
+
 // More steps are due than one call after the other could ever do.
 TEST_F(LoadTest, StepsThatWaitForOthersCountFromWhenTheyWereDue) {
   client::LoadOrder order{.scene = small_scene(), .sessions = 1, .drive = Drive::kStepped};
@@ -61,8 +66,7 @@ TEST_F(LoadTest, StepsThatWaitForOthersCountFromWhenTheyWereDue) {
   ASSERT_LT(result.frames_received, result.frames_due / 2);
   EXPECT_EQ(result.step.count(), result.frames_due);
   EXPECT_EQ(result.frame.count(), result.frames_due);
-  // most had waited since they were due
-  EXPECT_GE(result.frame.quantile(0.9), 0.1);
+  EXPECT_GE(result.frame.quantile(0.9), 0.3 * whole_time(result, order));
   EXPECT_EQ(result.frames_lost, 0);
 }
 
@@ -74,38 +78,40 @@ TEST_F(LoadTest, FramesThatAPacedSessionNeverComputedCountAsTheyHadWaited) {
   client::LoadOrder order{.scene = scene, .sessions = 1};
   order.rate_per_s = 500;
   order.ramp = milliseconds(0);
-  order.duration = milliseconds(300);
+  order.duration = milliseconds(500);
   const auto connection = client::Connection::to(address_, {});
   const client::LoadResult result = client::apply_load(*connection, order);
   ASSERT_LT(result.frames_received, result.frames_due / 2);
   EXPECT_EQ(result.frame.count(), result.frames_due);
-  EXPECT_GE(result.frame.quantile(0.9), 0.1);
+  EXPECT_GE(result.frame.quantile(0.9), 0.3 * whole_time(result, order));
   EXPECT_TRUE(result.clean());
 }
 
 TEST_F(LoadTest, CountsErrorsByReason) {
   const Outcome outcome =
       weft({"load", "--scene", scene_file(diverging_scene()), "--drive", "stepped", "--rate", "100",
-            "--sessions", "1", "--ramp", "0", "--duration", "0.3", "--json"});
+            "--sessions", "1", "--ramp", "0", "--frames", "1000", "--json"});
   EXPECT_EQ(outcome.exit, 1);
   EXPECT_THAT(outcome.err, HasSubstr("LOAD_FAILED"));
   const auto errors = outcome.json()["errors"];
-  EXPECT_GT(errors["step: SOLVER_FAILED"], 0) << errors;
-  EXPECT_EQ(errors["stream: SOLVER_FAILED"], 1) << errors;
+  EXPECT_GT(errors.value("step: SOLVER_FAILED", 0), 0) << errors;
+  EXPECT_EQ(errors.value("stream: SOLVER_FAILED", 0), 1) << errors;
   EXPECT_TRUE(ask({"session", "list"})["sessions"].empty());
 }
 
 TEST_F(LoadTest, FramesThatAStreamDidNotBringAreLost) {
-  // the second connection, which carries the streams
-  const BreakingProxy proxy(address_, 2, 20'000);
+  // of calls, of a hundred streams, and of one more: the second or third breaks, the other goes on
+  const BreakingProxy proxy(address_, 2, 8'000);
   const Outcome outcome =
-      run_weft({"load", "--scene", scene_file(small_scene()), "--rate", "500", "--sessions", "1",
-                "--ramp", "0", "--duration", "0.5", "--json", "--server", proxy.address()});
+      run_weft({"load", "--scene", scene_file(small_scene()), "--drive", "free", "--sessions", "1",
+                "--subscribers", "101", "--ramp", "0", "--frames", "100", "--duration", "60",
+                "--json", "--server", proxy.address()});
   EXPECT_EQ(outcome.exit, 1);
   const auto result = outcome.json();
-  EXPECT_GE(proxy.broken(), 1);
-  EXPECT_EQ(result["errors"]["stream: NO_CONNECTION"], 1) << result;
+  EXPECT_EQ(proxy.broken(), 1);
+  EXPECT_GE(result["errors"].value("stream: NO_CONNECTION", 0), 1) << result;
   EXPECT_GT(result["frames_lost"], 0);
+  EXPECT_EQ(result["frames_lost"].get<int>() + result["frames_received"].get<int>(), 101 * 100);
   EXPECT_EQ(result["frames_doubled"], 0);
 }
 

@@ -147,6 +147,11 @@ TEST(Templates, hold_what_they_say) {
   EXPECT_NE(wind.velocity_m_per_s().z(), 0);
   EXPECT_GT(wind.gust(), 0);
 
+  const v1::Scene load = make_template("load");
+  EXPECT_EQ(only_sheet(load).textile().raw().particle_mass_kg(), 1e-3);
+  EXPECT_EQ(only_sheet(load).textile().raw().stretch_n_per_m(), 1000);
+  EXPECT_GT(load.environment().wind().gust(), 0);
+
   const v1::Scene strip = make_template("cantilever", {.rows = 2, .columns = 5});
   EXPECT_EQ(pinned(only_sheet(strip)), (std::set{0, 1, 5, 6}));
   EXPECT_EQ(pinned(only_sheet(make_template("hang", {.columns = 9}))), (std::set{0, 8}));

@@ -1,0 +1,72 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "tests/stress/stress.h"
+
+namespace {
+
+using weft::stress::Form;
+using weft::stress::Outcome;
+
+struct Test {
+  const char* name;
+  Outcome (*run)(Form);
+};
+
+constexpr std::array kTests{
+    Test{"lossless", weft::stress::lossless},
+    Test{"real-time", weft::stress::real_time},
+    Test{"fan-out", weft::stress::fan_out},
+    Test{"churn", weft::stress::churn},
+    Test{"slow-readers", weft::stress::slow_readers},
+    Test{"kill", weft::stress::kills},
+    Test{"drain", weft::stress::drain},
+};
+
+int usage() {
+  std::string names;
+  for (const Test& test : kTests) names += std::string(" ") + test.name;
+  fmt::print(stderr, "usage: weft-stress [short|long] [TEST...]; there are{}\n", names);
+  return 2;
+}
+
+// False where what was seen decides against it.
+bool run(const Test& test, Form form) {
+  Outcome outcome;
+  try {
+    outcome = test.run(form);
+  } catch (const std::exception& error) {
+    outcome = {error.what(), "runs to its end", false, false};
+  }
+  fmt::print("{}: {} (hold: {}) {}\n", test.name, outcome.figure, outcome.hold,
+             outcome.counts && outcome.bounds ? "ok" : "SHORT");
+  std::fflush(stdout);
+  return outcome.counts && (outcome.bounds || form == Form::kShort);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<std::string> names(argv + 1, argv + argc);
+  Form form = Form::kShort;
+  if (!names.empty() && (names[0] == "short" || names[0] == "long")) {
+    form = names[0] == "long" ? Form::kLong : Form::kShort;
+    names.erase(names.begin());
+  }
+  for (const std::string& name : names) {
+    if (std::none_of(kTests.begin(), kTests.end(), [&](const Test& t) { return t.name == name; }))
+      return usage();
+  }
+  bool good = true;
+  for (const Test& test : kTests) {
+    if (names.empty() || std::find(names.begin(), names.end(), test.name) != names.end())
+      good = run(test, form) && good;
+  }
+  return good ? 0 : 1;
+}

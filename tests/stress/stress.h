@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+
+// What a weftd of its own process holds under load and faults. Each test is one function here and
+// one line of the table that `./dev stress` prints.
+namespace weft::stress {
+
+enum class Form { kShort, kLong };
+
+struct Outcome {
+  std::string figure;  // what was seen
+  std::string hold;    // what is to hold
+  bool counts = true;  // nothing lost, doubled, differing, leaked: decides in both forms
+  bool bounds = true;  // times, rates and bytes: decide in the long form
+};
+
+Outcome lossless(Form form);
+Outcome real_time(Form form);
+Outcome fan_out(Form form);
+Outcome churn(Form form);
+Outcome slow_readers(Form form);
+Outcome kills(Form form);
+Outcome drain(Form form);
+
+}  // namespace weft::stress

@@ -240,8 +240,8 @@ void run_load(Context& context, const LoadOptions& options) {
     throw usage_problem(fmt::format("{} sessions x {} subscribers are more than {} streams",
                                     order.sessions, order.subscribers, kMostStreams));
   }
-  if (order.frames && order.subscribers == 0)
-    throw usage_problem("--frames: without subscribers nobody counts them");
+  if ((order.frames || options.find_limit) && order.subscribers == 0)
+    throw usage_problem("--subscribers 0: nobody would count the frames");
   order.scene = checked_scene(context.connection(), options);
   order.ramp = std::chrono::duration<double>(options.ramp_s);
   order.duration = std::chrono::duration<double>(options.duration_s);

@@ -176,6 +176,7 @@ TEST_F(LoadTest, RefusesWhatMakesNoSense) {
   const std::string scene = scene_file(small_scene());
   EXPECT_EQ(weft({"load", "--scene", scene, "--drive", "free", "--find-limit"}).exit, 2);
   EXPECT_EQ(weft({"load", "--scene", scene, "--frames", "5", "--subscribers", "0"}).exit, 2);
+  EXPECT_EQ(weft({"load", "--scene", scene, "--find-limit", "--subscribers", "0"}).exit, 2);
   EXPECT_EQ(weft({"load", "--scene", scene, "--template", "load"}).exit, 2);
   EXPECT_EQ(weft({"load", "--scene", scene, "--target", "1"}).exit, 2);
   const Outcome too_fast = weft({"load", "--scene", scene, "--rate", "99999"});

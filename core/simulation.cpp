@@ -86,7 +86,7 @@ std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefiniti
                                          const Dynamics& dynamics) {
   if (!needs_plain_solver(scene, sheet).empty())
     return make_plain_solver(dynamics, scene.solver.integrator);
-  return make_lattice_solver(sheet, dynamics, scene.solver);
+  return make_lattice_solver(sheet, dynamics, scene.environment.wind, scene.solver);
 }
 
 struct Simulation::State {

@@ -19,10 +19,6 @@ using Places = Triple<Reals>;
 
 HWY_INLINE Reals real(double value) { return hn::Set(ContactTag(), value); }
 HWY_INLINE Places everywhere(const Vector3d& v) { return {real(v[0]), real(v[1]), real(v[2])}; }
-HWY_INLINE Reals dot(const Places& a, const Places& b) {
-  return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x)));
-}
-
 // Signed distances from a body, negative inside, and directions out of it.
 struct Distances {
   Reals value;

@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -13,7 +13,8 @@ namespace {
 template <class T>
 class LatticeSolver : public SheetSolver {
  public:
-  LatticeSolver(const SheetDefinition& sheet, const Dynamics& dynamics, bool compensated)
+  LatticeSolver(const SheetDefinition& sheet, const Dynamics& dynamics,
+                const std::optional<Wind>& wind, bool compensated)
       : dynamics_(dynamics),
         columns_(sheet.grid.columns),
         particles_(sheet.particle_count()),
@@ -22,6 +23,10 @@ class LatticeSolver : public SheetSolver {
         state_(law_.layout, compensated),
         gap_(static_cast<std::size_t>(law_.layout.rows)) {
     law_.compensated = compensated;
+    if (!wind) return;
+    law_.wind.blows = true;
+    law_.wind.pressure = static_cast<T>(wind->air_density / 12);
+    law_.wind.drag = static_cast<T>(wind->tangential_drag / 6);
   }
 
   void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
@@ -32,6 +37,7 @@ class LatticeSolver : public SheetSolver {
       origin_ /= particles_;
     }
     law_.damping = static_cast<T>(damping_ / (2 * dt));
+    law_.wind.to_velocity = static_cast<T>(1 / (6 * dt));
     // half a kick: x(-dt) = x - v dt + a dt^2 / 2
     Matrix3Xd a;
     accelerate(dynamics_, time, x, v, a);
@@ -52,8 +58,11 @@ class LatticeSolver : public SheetSolver {
       law_.drag = static_cast<T>(rate * dt_);
       drift += rate * dt_ * dt_ * dynamics_.air(time);
     }
-    for (std::size_t axis = 0; axis < 3; ++axis)
+    const Vector3d air = law_.wind.blows ? dynamics_.air(time) : Vector3d(Vector3d::Zero());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
       law_.drift[axis] = static_cast<T>(drift[static_cast<Eigen::Index>(axis)]);
+      law_.wind.velocity[axis] = static_cast<T>(air[static_cast<Eigen::Index>(axis)]);
+    }
     moved_ = sweep(law_, state_, bands(crew), crew);
   }
 
@@ -173,16 +182,16 @@ class LatticeSolver : public SheetSolver {
 
 std::unique_ptr<SheetSolver> make_lattice_solver(const SheetDefinition& sheet,
                                                  const Dynamics& dynamics,
+                                                 const std::optional<Wind>& wind,
                                                  const SolverSettings& settings) {
   if (settings.precision == Precision::kDouble)
-    return std::make_unique<LatticeSolver<double>>(sheet, dynamics, false);
-  return std::make_unique<LatticeSolver<float>>(sheet, dynamics, settings.compensated);
+    return std::make_unique<LatticeSolver<double>>(sheet, dynamics, wind, false);
+  return std::make_unique<LatticeSolver<float>>(sheet, dynamics, wind, settings.compensated);
 }
 
 std::string_view needs_plain_solver(const Scene& scene, const SheetDefinition& sheet) {
   if (scene.solver.plain) return "asked for";
   if (scene.solver.integrator != IntegratorKind::kVerlet) return "the integrator is not VERLET";
-  if (scene.environment.wind) return "the scene has wind";
   const auto* law = std::get_if<ChoiKo>(&sheet.bending);
   const bool slow = law != nullptr &&
                     (law->evaluator == Evaluator::kSeries || law->evaluator == Evaluator::kExact);

@@ -250,6 +250,7 @@ class Sweep {
     if (law_.damping > 0 && row.after) damp<kBorder>(row, p, f);
     add_springs<kBorder>(row, p, f, connections());
     if constexpr (kIsometric) add_isometric<kBorder>(row, p, f);
+    if (law_.wind.blows && row.after) add_wind<kBorder>(p, f);
     store(f.next, p.force1);
     store(f.after, p.force2);
     if (row.moves) move(p, f.own);
@@ -354,6 +355,52 @@ class Sweep {
     store(plus(plus_times(load(next1), along, two), twist), next1);
     store(minus(load(next2), along), next2);
     store(minus(load(after1), twist), after1);
+  }
+
+  // The cell below row r + 1: its triangles as add_wind_forces() has them.
+  template <bool kBorder>
+  HWY_INLINE void add_wind(const Place& p, Forces& f) const {
+    const D d;
+    constexpr std::ptrdiff_t kW = State::kW * kLanes;
+    const T *const seen1 = p.seen1, *const seen2 = p.seen2;
+    const Triple<V> here = load(seen1), right = load(seen1 + kSeen), below = load(seen2);
+    const Triple<V> beyond = load(seen2 + kSeen);
+    const Triple<V> slow = plus(load(seen1 + kSeen + kW), load(seen2 + kW));  // of both
+    const Each<Triple<V>, 2> cross{product(minus(below, here), minus(right, here)),
+                                   product(minus(right, beyond), minus(below, beyond))};
+    const Each<V, 2> area2{squared(cross[0]), squared(cross[1])};
+    const Each<V, 2> inverse = inverse_sqrt(d, area2);
+    Triple<V> upper = blow(cross[0], area2[0], inverse[0], plus(slow, load(seen1 + kW)));
+    Triple<V> lower = blow(cross[1], area2[1], inverse[1], plus(slow, load(seen2 + kSeen + kW)));
+    if constexpr (kBorder) {
+      upper = only(upper, column(p, kRight1));
+      lower = only(lower, column(p, kRight1));
+    }
+    const Triple<V> both = plus(upper, lower);
+    f.next = plus(f.next, upper);
+    f.after = plus(f.after, both);
+    T *const next1 = p.force1 + kForces, *const after1 = p.force2 + kForces;
+    store(plus(load(next1), both), next1);
+    store(plus(load(after1), lower), after1);
+  }
+
+  // On each corner of a triangle, N. cross: along its normal, twice its area long.
+  HWY_INLINE Triple<V> blow(const Triple<V>& cross, V square, V inverse,
+                            const Triple<V>& three_w) const {
+    const D d;
+    const WindLaw<T>& wind = law_.wind;
+    const Triple<V> air{hn::Set(d, wind.velocity[0]), hn::Set(d, wind.velocity[1]),
+                        hn::Set(d, wind.velocity[2])};
+    const Triple<V> relative = minus_times(air, three_w, hn::Set(d, wind.to_velocity));
+    const V along = hn::Mul(dot(relative, cross), inverse);
+    const V drag = hn::Set(d, wind.drag);
+    const V push = hn::Mul(
+        along, hn::NegMulAdd(hn::Abs(along), hn::Neg(hn::Set(d, wind.pressure)), hn::Neg(drag)));
+    return plus_times(times(cross, push), relative, hn::Mul(hn::Mul(square, inverse), drag));
+  }
+
+  static HWY_INLINE Triple<V> only(const Triple<V>& v, V mask) {
+    return {hn::And(v.x, mask), hn::And(v.y, mask), hn::And(v.z, mask)};
   }
 
   // Damping (eq. 7), as the sum of w over all neighbours less as many times its own. Row r + 2 has

@@ -71,6 +71,16 @@ struct BendLaw {
   AlignedArray<T> intercepts, slopes;
 };
 
+// Moving air, as it presses on the two triangles of every cell.
+template <class T>
+struct WindLaw {
+  bool blows = false;
+  std::array<T, 3> velocity{};  // of the air, m/s
+  T to_velocity = 0;            // 1 / (6 dt): what the sum of three w is multiplied by, 1/s
+  T pressure = 0;               // rho / 12, kg/m^3
+  T drag = 0;                   // c_t / 6, kg/(m^2 s)
+};
+
 enum class BendKind { kNone, kTable32, kTable, kPolynomial, kIsometric };
 
 // What the columns of a vector differ in.
@@ -102,9 +112,10 @@ struct SweepLaw {
   T damping = 0;                                     // k_d / (2 dt), kg/s^2
   bool damp_far = false, damp_far_diagonal = false;  // bend connections damp too
   T drag = 0;                                        // c dt / m
-  std::array<T, 3> drift{};                          // (gravity + c / m air) dt^2, m
-  bool compensated = true;                           // the sums of d and x
-  bool measured = false;                             // whether sweep() says how far particles went
+  WindLaw<T> wind;
+  std::array<T, 3> drift{};  // (gravity + c / m air) dt^2, m
+  bool compensated = true;   // the sums of d and x
+  bool measured = false;     // whether sweep() says how far particles went
 
   AlignedArray<T> columns;   // (vectors x kColumnPlanes x lanes)
   std::vector<char> border;  // of each vector: whether some column lacks a neighbour

@@ -49,6 +49,17 @@ HWY_INLINE V squared(const Triple<V>& a) {
   return hn::MulAdd(a.z, a.z, hn::MulAdd(a.y, a.y, hn::Mul(a.x, a.x)));
 }
 
+template <class V>
+HWY_INLINE V dot(const Triple<V>& a, const Triple<V>& b) {
+  return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x)));
+}
+// a x b
+template <class V>
+HWY_INLINE Triple<V> product(const Triple<V>& a, const Triple<V>& b) {
+  return {hn::NegMulAdd(a.z, b.y, hn::Mul(a.y, b.z)), hn::NegMulAdd(a.x, b.z, hn::Mul(a.z, b.x)),
+          hn::NegMulAdd(a.y, b.x, hn::Mul(a.x, b.y))};
+}
+
 // Of N connections that are evaluated side by side: their long chains of operations then fill the
 // processor.
 template <class A, std::size_t N>

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "core/contact/contact.h"
@@ -39,10 +40,11 @@ class SheetSolver {
 // One connection after the other, in double; any integrator, any force.
 std::unique_ptr<SheetSolver> make_plain_solver(const Dynamics& dynamics, IntegratorKind integrator);
 
-// Rows of a lattice in vectors: Verlet without wind. `dynamics` are the same forces in double, for
+// Rows of a lattice in vectors: Verlet. `dynamics` are the same forces in double, for
 // starts; both must outlive the solver.
 std::unique_ptr<SheetSolver> make_lattice_solver(const SheetDefinition& sheet,
                                                  const Dynamics& dynamics,
+                                                 const std::optional<Wind>& wind,
                                                  const SolverSettings& settings);
 
 // What make_lattice_solver() cannot step, as a reason; empty where it can.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include "core/contact/contact.h"
 #include "core/motion/lattice_law.h"
@@ -17,7 +18,7 @@ namespace {
 constexpr int kSteps = 4;
 
 // A crumpled sheet in motion, two corners held.
-Scene crumpled(SheetDefinition sheet) {
+Scene crumpled(SheetDefinition sheet, const std::optional<Wind>& wind = {}) {
   const double h = sheet.grid.spacing;
   const int n = sheet.particle_count();
   sheet.start_positions = values(start_positions(sheet) + 0.3 * h * noise(n));
@@ -25,6 +26,7 @@ Scene crumpled(SheetDefinition sheet) {
   sheet.pins = {{{0, sheet.grid.columns - 1}, {}}};
   Scene scene = floating(sheet);
   scene.environment.gravity = {0.3, -9.8, 0.1};
+  scene.environment.wind = wind;
   scene.solver.substep = 0.5 * Simulation(scene).plan().step.linear_bound;
   scene.solver.frame_step = *scene.solver.substep;
   return scene;
@@ -45,8 +47,9 @@ double tolerance(const Scene& scene, double epsilon) {
   return epsilon * extent * 12 * 16 * 0.5 * kSteps * (kSteps + 1) / 2;
 }
 
-void expect_like_plain(const SheetDefinition& sheet, const std::string& what) {
-  Scene scene = crumpled(sheet);
+void expect_like_plain(const SheetDefinition& sheet, const std::string& what,
+                       const std::optional<Wind>& wind = {}) {
+  Scene scene = crumpled(sheet, wind);
   scene.solver.plain = true;
   const Simulation plain = after(scene, kSteps);
   scene.solver.plain = false;
@@ -137,6 +140,19 @@ TEST_P(Kernels, FollowThePlainSolverOnEverySize) {
   }
 }
 
+TEST_P(Kernels, FollowThePlainSolverInWind) {
+  Wind wind;
+  wind.velocity = {3, 1, -5};
+  wind.gust = 0.5;
+  wind.gust_period = 1e-3;
+  wind.tangential_drag = 0.05;
+  for (const auto& [rows, columns] : {std::pair(2, 2), std::pair(5, 16), std::pair(17, 35)}) {
+    SheetDefinition sheet = flat_sheet(rows, columns);
+    GetParam().set(sheet);
+    expect_like_plain(sheet, std::to_string(rows) + " x " + std::to_string(columns), wind);
+  }
+}
+
 template <class T>
 void fill_with_nan(SweepState<T>& state, const LatticeLayout<T>& layout) {
   for (int r = 0; r < layout.rows; ++r)
@@ -161,6 +177,7 @@ std::vector<T> swept(const SheetDefinition& sheet, bool poisoned, int bands = 1)
   SweepLaw<T> law = make_sweep_law<T>(sheet);
   law.damping = static_cast<T>(sheet.textile.damping / (2 * 1e-4));
   law.drift = {0, T(-1e-7), 0};
+  law.wind = {true, {T(2), T(-1), T(4)}, T(1 / 6e-4), T(0.1), T(0.01)};
   State state(law.layout, law.compensated);
   BackwardCrew crew;
   if (poisoned) fill_with_nan(state, law.layout);

@@ -549,15 +549,15 @@ double sweep_band(const SweepLaw<double>& law, SweepState<double>& state, SweepB
 }  // namespace
 
 template <class T>
-T sweep(const SweepLaw<T>& law, SweepState<T>& state, int count, Crew& crew) {
-  std::vector<SweepBand<T>>& bands = state.divide(count);
-  if (count == 1) return sweep_band(law, state, bands.front());
-  crew.run(count, [&](int i) {
-    SweepBand<T>& band = bands[static_cast<std::size_t>(i)];
+T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, Crew& crew) {
+  std::vector<SweepBand<T>>& divided = state.divide(bands);
+  if (bands == 1) return sweep_band(law, state, divided.front());
+  crew.run(bands, [&](int i) {
+    SweepBand<T>& band = divided[static_cast<std::size_t>(i)];
     band.farthest = sweep_band(law, state, band);
   });
   T farthest = 0;
-  for (const SweepBand<T>& band : bands) farthest = std::max(farthest, band.farthest);
+  for (const SweepBand<T>& band : divided) farthest = std::max(farthest, band.farthest);
   return farthest;
 }
 

@@ -155,7 +155,7 @@ void FrameStream::write_frame(const Frame& frame) {
   grpc::ByteBuffer message = encoded_frame(frame, request_.format());
   ++backend_.stats.frames_sent;
   backend_.stats.bytes_sent += static_cast<std::int64_t>(message.Length());
-  write(std::move(message));
+  write(message);
 }
 
 void FrameStream::write_header() {

@@ -16,8 +16,8 @@ struct Case {
   Precision precision = Precision::kSingle;
   std::int64_t target = 0;  // of Highway; 0: the plain solver
   bool bare = false;        // neither damping nor compensation
-  int threads = 1;
   ChoiKo law{};
+  int threads = 1;
 };
 
 // Substeps of a sheet of the paper's textile hung by two corners, from when it has begun to fall.

@@ -30,9 +30,9 @@ std::unique_ptr<FrameCrew> full_crew(Scheduler& scheduler, int hands) {
 }
 
 TEST(FrameCrew, RunsEveryPartOnce) {
-  Scheduler scheduler(3);
-  const auto crew = full_crew(scheduler, 4);
-  for (int round = 0; round < 500; ++round) {
+  Scheduler scheduler(2);
+  const auto crew = full_crew(scheduler, 3);
+  for (int round = 0; round < 100; ++round) {
     std::vector<int> runs(8);
     crew->run(8, [&](int part) { ++runs[static_cast<std::size_t>(part)]; });
     ASSERT_THAT(runs, ::testing::Each(1)) << round;
@@ -40,8 +40,8 @@ TEST(FrameCrew, RunsEveryPartOnce) {
 }
 
 TEST(FrameCrew, TakesNoThreadThatHasSomethingToDo) {
-  Scheduler scheduler(1);
   std::promise<void> begun, end;
+  Scheduler scheduler(1);
   ASSERT_TRUE(scheduler.post([&] {
     begun.set_value();
     end.get_future().wait();
@@ -52,9 +52,9 @@ TEST(FrameCrew, TakesNoThreadThatHasSomethingToDo) {
 }
 
 TEST(FrameCrew, LeavesWhenSomethingElseWaits) {
+  std::promise<void> done;
   Scheduler scheduler(1);
   const auto crew = full_crew(scheduler, 2);
-  std::promise<void> done;
   ASSERT_TRUE(scheduler.post([&] { done.set_value(); }));
   done.get_future().wait();
   EXPECT_EQ(crew->hands(), 1);

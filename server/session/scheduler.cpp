@@ -35,7 +35,7 @@ bool Scheduler::post(std::function<void()> work) {
   std::lock_guard lock(mutex_);
   if (stopping_ || posted_ >= kMaxPosted) return false;
   ++posted_;
-  push({nullptr, std::move(work)});
+  push({nullptr, std::move(work), false});
   return true;
 }
 
@@ -43,20 +43,20 @@ bool Scheduler::help(std::function<void()> work) {
   std::lock_guard lock(mutex_);
   if (stopping_ || idle_ <= ready_.size()) return false;
   ++posted_;
-  push({nullptr, std::move(work)});
+  push({nullptr, std::move(work), true});
   return true;
 }
 
 void Scheduler::push(Job job) {
+  if (!job.helps) ++wanted_;
   ready_.push_back(std::move(job));
-  busy_ = true;
   changed_.notify_one();
 }
 
 Scheduler::Job Scheduler::pop() {
   Job job = std::move(ready_.front());
   ready_.pop_front();
-  busy_ = !ready_.empty();
+  if (!job.helps) --wanted_;
   return job;
 }
 
@@ -92,7 +92,7 @@ void Scheduler::work() {
 // Precondition: the task is in no queue.
 void Scheduler::queue(std::shared_ptr<Task> task) {
   task->phase_ = Task::Phase::kQueued;
-  push({std::move(task), nullptr});
+  push({std::move(task), nullptr, false});
 }
 
 void Scheduler::queue_due() {

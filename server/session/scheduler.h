@@ -52,7 +52,7 @@ class Scheduler {
   [[nodiscard]] bool help(std::function<void()> work);
 
   // Whether something waits for a thread.
-  bool busy() const { return busy_ || Clock::now().time_since_epoch().count() >= next_due_; }
+  bool busy() const { return wanted_ > 0 || Clock::now().time_since_epoch().count() >= next_due_; }
 
   // Lets each thread finish its slice, and drops the rest.
   void stop();
@@ -62,6 +62,7 @@ class Scheduler {
   struct Job {  // one of the two
     std::shared_ptr<Task> task;
     std::function<void()> work;
+    bool helps = false;  // of help()
   };
 
   void work();
@@ -75,9 +76,9 @@ class Scheduler {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Job> ready_;
-  std::atomic<bool> busy_ = false;                                   // ready_ is not empty
-  std::size_t idle_ = 0;                                             // threads that wait
-  std::size_t posted_ = 0;                                           // jobs in ready_ with work
+  std::atomic<int> wanted_ = 0;  // jobs in ready_ that do not help
+  std::size_t idle_ = 0;         // threads that wait
+  std::size_t posted_ = 0;       // jobs in ready_ with work
   std::multimap<Clock::time_point, std::shared_ptr<Task>> waiting_;  // by due time
   std::atomic<Clock::rep> next_due_ = kNever;                        // of waiting_
   bool stopping_ = false;

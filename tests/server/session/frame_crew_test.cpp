@@ -30,8 +30,8 @@ std::unique_ptr<FrameCrew> full_crew(Scheduler& scheduler, int hands) {
 }
 
 TEST(FrameCrew, RunsEveryPartOnce) {
-  Scheduler scheduler(2);
-  const auto crew = full_crew(scheduler, 3);
+  Scheduler scheduler(1);
+  const auto crew = full_crew(scheduler, 2);
   for (int round = 0; round < 100; ++round) {
     std::vector<int> runs(8);
     crew->run(8, [&](int part) { ++runs[static_cast<std::size_t>(part)]; });

@@ -9,8 +9,6 @@
 #include <random>
 #include <sstream>
 
-#include "server/session/frame_crew.h"
-
 namespace weft {
 namespace {
 
@@ -573,12 +571,7 @@ void Session::count_frame(std::chrono::duration<double> time) {
   stats_.frame_time.add(time);
 }
 
-bool Session::advance_frame() {
-  const int most_hands = simulation_.most_hands();
-  if (most_hands == 1) return simulation_.advance_frame();
-  FrameCrew crew(scheduler_, most_hands);
-  return simulation_.advance_frame(crew);
-}
+bool Session::advance_frame() { return simulation_.advance_frame(); }
 
 // Those that the last frame took, which are published with it.
 std::vector<Repair> Session::take_repairs() {

@@ -9,6 +9,8 @@
 #include <random>
 #include <sstream>
 
+#include "server/session/frame_crew.h"
+
 namespace weft {
 namespace {
 
@@ -571,7 +573,12 @@ void Session::count_frame(std::chrono::duration<double> time) {
   stats_.frame_time.add(time);
 }
 
-bool Session::advance_frame() { return simulation_.advance_frame(); }
+bool Session::advance_frame() {
+  const int most_hands = simulation_.most_hands();
+  if (most_hands == 1) return simulation_.advance_frame();
+  FrameCrew crew(scheduler_, most_hands);
+  return simulation_.advance_frame(crew);
+}
 
 // Those that the last frame took, which are published with it.
 std::vector<Repair> Session::take_repairs() {

@@ -1,0 +1,109 @@
+#include "server/session/frame_crew.h"
+
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <future>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "tests/server/session/session_support.h"
+#include "tests/support/core/scenes.h"
+
+namespace weft::testing {
+namespace {
+
+using namespace std::chrono_literals;
+
+// With every thread of the scheduler in it.
+std::unique_ptr<FrameCrew> full_crew(Scheduler& scheduler, int hands) {
+  for (auto patience = 1ms;; patience *= 2) {  // its threads may be busy, or slow to come
+    auto crew = std::make_unique<FrameCrew>(scheduler, hands);
+    const auto end = Clock::now() + patience;
+    while (Clock::now() < end) {
+      if (crew->hands() == hands) return crew;
+      std::this_thread::yield();
+    }
+  }
+}
+
+TEST(FrameCrew, RunsEveryPartOnce) {
+  Scheduler scheduler(2);
+  const auto crew = full_crew(scheduler, 3);
+  for (int round = 0; round < 100; ++round) {
+    std::vector<int> runs(8);
+    crew->run(8, [&](int part) { ++runs[static_cast<std::size_t>(part)]; });
+    ASSERT_THAT(runs, ::testing::Each(1)) << round;
+  }
+}
+
+TEST(FrameCrew, TakesNoThreadThatHasSomethingToDo) {
+  std::promise<void> begun, end;
+  Scheduler scheduler(1);
+  ASSERT_TRUE(scheduler.post([&] {
+    begun.set_value();
+    end.get_future().wait();
+  }));
+  begun.get_future().wait();
+  EXPECT_FALSE(scheduler.help([] {}));
+  end.set_value();
+}
+
+TEST(FrameCrew, LeavesWhenSomethingElseWaits) {
+  std::promise<void> done;
+  Scheduler scheduler(1);
+  const auto crew = full_crew(scheduler, 2);
+  ASSERT_TRUE(scheduler.post([&] { done.set_value(); }));
+  done.get_future().wait();
+  EXPECT_EQ(crew->hands(), 1);
+}
+
+// Waits for a time, once.
+class Waits : public Task {
+ public:
+  explicit Waits(std::promise<void>& done) : done_(done) {}
+  std::optional<Clock::time_point> run_slice() override {
+    if (!due_) return due_ = Clock::now() + 50ms;
+    if (Clock::now() < *due_) return due_;
+    done_.set_value();
+    return std::nullopt;
+  }
+
+ private:
+  std::promise<void>& done_;
+  std::optional<Clock::time_point> due_;
+};
+
+TEST(FrameCrew, LeavesForATaskWhoseTimeHasCome) {
+  std::promise<void> done;
+  Scheduler scheduler(1);
+  scheduler.wake(std::make_shared<Waits>(done));
+  const auto crew = full_crew(scheduler, 2);
+  done.get_future().wait();
+}
+
+TEST(FrameCrew, DoesNotChangeTheFramesOfALargeSheet) {
+  SheetDefinition sheet = flat_sheet(64, 130);
+  sheet.pins = {{{0, 129}, {}}};
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.solver.frame_step = 1e-3;
+  Simulation alone(scene);
+  ASSERT_GT(alone.most_hands(), 1);
+
+  Scheduler scheduler(3);
+  const auto session = make_session(scheduler, scene);
+  const auto watcher = Watcher::of(*session, 1);
+  step(*session, 4).applied();
+  for (int frame = 1; frame <= 4; ++frame) {
+    ASSERT_TRUE(alone.advance_frame());
+    std::vector<double> expected(3 * static_cast<std::size_t>(alone.particle_count()));
+    alone.copy_positions(expected);
+    EXPECT_EQ(watcher->read().frame->positions, expected) << frame;
+  }
+}
+
+}  // namespace
+}  // namespace weft::testing

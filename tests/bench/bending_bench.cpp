@@ -1,45 +1,55 @@
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cmath>
-#include <random>
 #include <string>
 
 #include "core/forces/bending_law.h"
+#include "tests/bench/lengths.h"
 
 namespace weft {
 namespace {
-
-// r spread evenly over [0, 1), in no order.
-const std::vector<double>& lengths() {
-  static const std::vector<double> values = [] {
-    std::mt19937_64 random(1);
-    std::vector<double> out(4096);
-    for (double& r : out) r = static_cast<double>(random() >> 11) * 0x1p-53;
-    return out;
-  }();
-  return values;
-}
 
 // Time of one g(r), with the largest relative error beside it.
 template <class Function>
 void evaluate(benchmark::State& state, const Function& function) {
   double largest = 0;
   const ExactBending exact;
-  for (const double r : lengths())
+  for (const double r : bench::even_lengths())
     largest = std::max(largest, std::abs(function.value(r) / exact.value(r) - 1));
   for (auto _ : state) {
     double sum = 0;
-    for (const double r : lengths()) sum += function.value(r);
+    for (const double r : bench::even_lengths()) sum += function.value(r);
     benchmark::DoNotOptimize(sum);
   }
-  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(lengths().size()));
+  state.SetItemsProcessed(state.iterations() *
+                          static_cast<std::int64_t>(bench::even_lengths().size()));
   state.counters["error"] = largest;
+}
+
+// Time of one step's bending: of every connection that is shortened.
+template <class Function>
+void evaluate_hung(benchmark::State& state, const Function& function) {
+  const auto& lengths = bench::hung_lengths();
+  const std::size_t connections = lengths.size() / bench::kHungSteps;
+  std::size_t begin = 0;
+  for (auto _ : state) {
+    double sum = 0;
+    for (std::size_t i = begin; i < begin + connections; ++i)
+      if (lengths[i] < 1) sum += function.value(lengths[i]);
+    benchmark::DoNotOptimize(sum);
+    begin = (begin + connections) % lengths.size();
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(connections));
 }
 
 template <class Function>
 void add(const std::string& name, const Function& function) {
   benchmark::RegisterBenchmark(("bending_scalar/" + name).c_str(),
                                [function](benchmark::State& state) { evaluate(state, function); });
+  benchmark::RegisterBenchmark(
+      ("bending_31x31_scalar/" + name).c_str(),
+      [function](benchmark::State& state) { evaluate_hung(state, function); });
 }
 
 const bool added = [] {
@@ -49,6 +59,12 @@ const bool added = [] {
     add("LINEARIZED/" + std::to_string(segments), LinearizedBending(segments));
   for (const int degree : {5, 7, 10})
     add("POLYNOMIAL/" + std::to_string(degree), PolynomialBending(degree));
+  for (const int segments : {32, 1024})
+    benchmark::RegisterBenchmark(("bending_table/" + std::to_string(segments)).c_str(),
+                                 [segments](benchmark::State& state) {
+                                   for (auto _ : state)
+                                     benchmark::DoNotOptimize(LinearizedBending(segments));
+                                 });
   return true;
 }();
 

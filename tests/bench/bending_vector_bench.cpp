@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <random>
 #include <string>
 #include <vector>
 
 #include "core/forces/bending_law.h"
+#include "tests/bench/lengths.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "tests/bench/bending_vector_bench.cpp"
@@ -75,18 +75,16 @@ namespace {
 
 using Function = void (*)(const BendLaw<float>&, int, const float*, float*, std::size_t);
 
-constexpr std::size_t kCount = 4096;
-
-// Time of one g(r) in vectors, with the largest relative error beside it; r spread evenly over
-// [0, 1 - 1e-3), in no order: nearer the flat sheet the series is 0 / 0 in single precision.
+// Time of one g(r) in vectors, with the largest relative error beside it; r up to 1 - 1e-3: nearer
+// the flat sheet the series is 0 / 0 in single precision.
 template <class Dispatch>
 void evaluate(benchmark::State& state, const Dispatch& dispatch, const BendLaw<float>& law,
               int terms) {
-  AlignedArray<float> r(kCount), g(kCount);
-  std::mt19937_64 random(1);
-  for (std::size_t i = 0; i < kCount; ++i)
-    r.data()[i] = 0.999f * static_cast<float>(random() >> 40) * 0x1p-24f;
-  const auto run = [&] { dispatch()(law, terms, r.data(), g.data(), kCount); };
+  const std::size_t count = bench::even_lengths().size();
+  AlignedArray<float> r(count), g(count);
+  for (std::size_t i = 0; i < count; ++i)
+    r.data()[i] = 0.999f * static_cast<float>(bench::even_lengths()[i]);
+  const auto run = [&] { dispatch()(law, terms, r.data(), g.data(), count); };
   run();  // picks the target
   for (auto _ : state) {
     run();
@@ -94,18 +92,37 @@ void evaluate(benchmark::State& state, const Dispatch& dispatch, const BendLaw<f
   }
   double largest = 0;
   const ExactBending exact;
-  for (std::size_t i = 0; i < kCount; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     const double true_value = exact.value(double{r.data()[i]});
     largest = std::max(largest, std::abs(double{g.data()[i]} / true_value - 1));
   }
-  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kCount));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(count));
   state.counters["error"] = largest;
+}
+
+// Time of one step's bending: of every connection, shortened or not.
+template <class Dispatch>
+void evaluate_hung(benchmark::State& state, const Dispatch& dispatch, const BendLaw<float>& law,
+                   int terms) {
+  const auto& lengths = bench::hung_lengths();
+  const std::size_t connections = lengths.size() / bench::kHungSteps;
+  const std::size_t padded = (connections + 63) / 64 * 64;  // whole vectors
+  AlignedArray<float> r(padded * bench::kHungSteps), g(padded);
+  for (std::size_t i = 0; i < lengths.size(); ++i)
+    r.data()[i / connections * padded + i % connections] = static_cast<float>(lengths[i]);
+  std::size_t step = 0;
+  for (auto _ : state) {
+    dispatch()(law, terms, r.data() + step * padded, g.data(), padded);
+    benchmark::ClobberMemory();
+    step = (step + 1) % bench::kHungSteps;
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(connections));
 }
 
 template <class Dispatch>
 void add(const std::string& name, const Dispatch& dispatch, const std::vector<double>& intercepts,
          const std::vector<double>& slopes, double to_index) {
-  benchmark::RegisterBenchmark(("bending/" + name).c_str(), [=](benchmark::State& state) {
+  const auto with_law = [=](const auto& run) {
     BendLaw<float> law;
     const auto fill = [](const std::vector<double>& from, AlignedArray<float>& to) {
       to = AlignedArray<float>(std::max<std::size_t>(32, from.size()));
@@ -116,7 +133,14 @@ void add(const std::string& name, const Dispatch& dispatch, const std::vector<do
     fill(slopes, law.slopes);
     law.to_index = static_cast<float>(to_index);
     law.last = static_cast<float>(intercepts.size() - 1);
-    evaluate(state, dispatch, law, static_cast<int>(intercepts.size()));
+    run(law, static_cast<int>(intercepts.size()));
+  };
+  benchmark::RegisterBenchmark(("bending/" + name).c_str(), [=](benchmark::State& state) {
+    with_law([&](const BendLaw<float>& law, int terms) { evaluate(state, dispatch, law, terms); });
+  });
+  benchmark::RegisterBenchmark(("bending_31x31/" + name).c_str(), [=](benchmark::State& state) {
+    with_law(
+        [&](const BendLaw<float>& law, int terms) { evaluate_hung(state, dispatch, law, terms); });
   });
 }
 

@@ -1,9 +1,12 @@
 #include <benchmark/benchmark.h>
 #include <hwy/targets.h>
+#include <malloc.h>
 
 #include <cstdlib>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "server/session/frame_crew.h"
 #include "tests/support/core/scenes.h"
@@ -42,7 +45,7 @@ void advance(benchmark::State& state, const Case& given) {
   std::optional<FrameCrew> crew;
   do {
     crew.emplace(scheduler, given.threads);
-    for (int frame = 0; frame < 20; ++frame)
+    for (int frame = 0; frame < (given.rows > 317 ? 2 : 20); ++frame)
       if (!simulation.advance_frame(*crew)) std::abort();
   } while (crew->hands() < given.threads);
   for (auto _ : state)
@@ -52,12 +55,36 @@ void advance(benchmark::State& state, const Case& given) {
   hwy::SetSupportedTargetsForTest(0);
 }
 
+// Bytes that a simulation holds when it has made its first frame.
+void hold(benchmark::State& state, int rows) {
+  SheetDefinition sheet = testing::flat_sheet(rows, rows);
+  sheet.pins = {{{0, rows - 1}, {}}};
+  const Scene scene = testing::floating(sheet);
+  constexpr int kCount = 16;
+  for (auto _ : state) {
+    std::vector<Simulation> simulations;
+    simulations.reserve(kCount);
+    const struct mallinfo2 before = mallinfo2();
+    for (int i = 0; i < kCount; ++i)
+      if (!simulations.emplace_back(scene).advance_frame()) std::abort();
+    const struct mallinfo2 after = mallinfo2();
+    state.counters["bytes"] =
+        static_cast<double>(after.uordblks + after.hblkhd - before.uordblks - before.hblkhd) /
+        kCount;
+  }
+}
+
 void add(const std::string& name, const Case& given) {
   benchmark::RegisterBenchmark(name.c_str(),
                                [given](benchmark::State& state) { advance(state, given); });
 }
 
 const bool added = [] {
+  for (const int rows : {31, 101})
+    benchmark::RegisterBenchmark(
+        ("memory/" + std::to_string(rows) + "x" + std::to_string(rows)).c_str(),
+        [rows](benchmark::State& state) { hold(state, rows); })
+        ->Iterations(1);
   for (const int rows : {31, 101, 317, 1000}) {
     const std::string size = std::to_string(rows) + "x" + std::to_string(rows);
     for (const auto& [target, name] : {std::pair<std::int64_t, const char*>(HWY_AVX3, "AVX-512"),

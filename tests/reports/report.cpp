@@ -5,6 +5,7 @@
 
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <stdexcept>
 #include <thread>
 
@@ -65,13 +66,15 @@ std::string number(double value) { return fmt::format("{:.4g}", value); }
 
 int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
-  const std::string page = arguments.size() < 3 ? "" : arguments[0];
-  if (page != "accuracy" && page != "stability") {
-    std::cerr << "usage: weft-report accuracy|stability FOLDER COMMIT [--large]\n";
+  const std::map<std::string, decltype(&weft::reports::accuracy)> pages = {
+      {"accuracy", weft::reports::accuracy},
+      {"stability", weft::reports::stability},
+      {"speed", weft::reports::speed}};
+  if (arguments.size() < 3 || !pages.contains(arguments[0])) {
+    std::cerr << "usage: weft-report accuracy|stability|speed FOLDER COMMIT [--large]\n";
     return 2;
   }
   const bool large = arguments.size() > 3 && arguments[3] == "--large";
-  const auto write = page == "accuracy" ? weft::reports::accuracy : weft::reports::stability;
-  write(arguments[1], arguments[2], large);
+  pages.at(arguments[0])(arguments[1], arguments[2], large);
   std::cout << arguments[1] << "/README.md\n";
 }

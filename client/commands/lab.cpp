@@ -76,6 +76,7 @@ v1::LabReport report_of(Context& context, const v1::RunTestRequest& request) {
 }
 
 std::string error_text(const v1::LabValue& value) {
+  if (!value.has_asked()) return "-";
   if (value.unit() == "degrees") return fmt::format("{:+.2f}", value.found() - value.asked());
   if (value.asked() == 0) return "-";
   return fmt::format("{:+.3g} %", 100 * (value.found() / value.asked() - 1));
@@ -101,8 +102,9 @@ std::string report_text(const v1::LabReport& report) {
   Table table({"QUANTITY", "UNIT", "SPACING", "PARTICLES", "ASKED", "FOUND", "ERROR"});
   for (const auto& value : report.values()) {
     table.add({value.quantity(), value.unit(), fmt::format("{:.3g} mm", 1000 * value.spacing_m()),
-               std::to_string(value.particles()), number_text(value.asked()),
-               number_text(value.found()), error_text(value)});
+               std::to_string(value.particles()),
+               value.has_asked() ? number_text(value.asked()) : "-", number_text(value.found()),
+               error_text(value)});
   }
   std::string text = wrapped(report.method()) + '\n' + table.text();
   for (const auto& note : report.notes()) text += '\n' + wrapped("note: " + note, 6);
@@ -112,8 +114,10 @@ std::string report_text(const v1::LabReport& report) {
 std::string values_csv(const v1::LabReport& report) {
   std::string csv = "quantity,unit,spacing_m,particles,asked,found\n";
   for (const auto& value : report.values())
-    csv += fmt::format("\"{}\",\"{}\",{:.9g},{},{:.12g},{:.12g}\n", value.quantity(), value.unit(),
-                       value.spacing_m(), value.particles(), value.asked(), value.found());
+    csv +=
+        fmt::format("\"{}\",\"{}\",{:.9g},{},{},{:.12g}\n", value.quantity(), value.unit(),
+                    value.spacing_m(), value.particles(),
+                    value.has_asked() ? fmt::format("{:.12g}", value.asked()) : "", value.found());
   return csv;
 }
 
@@ -170,7 +174,7 @@ Plot plot_of_values(const v1::LabReport& report) {
   for (const auto& value : report.values()) {
     plot.y_label = value.unit();
     found[value.quantity()].points.emplace_back(1000 * value.spacing_m(), value.found());
-    asked.points.emplace_back(1000 * value.spacing_m(), value.asked());
+    if (value.has_asked()) asked.points.emplace_back(1000 * value.spacing_m(), value.asked());
   }
   plot.series.push_back(asked);
   for (auto& [quantity, series] : found) {
@@ -194,7 +198,7 @@ void run_lab(Context& context, const LabOptions& options) {
   if (!options.svg.empty()) {
     Plot plot = report.curves().empty() ? plot_of_values(report) : plot_of_curves(report);
     plot.title = options.name + " of " + options.textile;
-    plot.downwards = options.test == v1::LAB_TEST_CANTILEVER;
+    plot.downwards = options.test == v1::LAB_TEST_CANTILEVER || options.test == v1::LAB_TEST_DRAPE;
     write_text(options.svg, svg_text(plot));
   }
   context.answer(to_json(report), report_text(report));
@@ -262,6 +266,8 @@ void add_lab(CLI::App& app, Context& context) {
            "ASTM D1388: hang a strip over an edge");
   add_test(*lab, context, "chain", v1::LAB_TEST_CHAIN,
            "Hang threads between two hooks: a catenary");
+  add_test(*lab, context, "drape", v1::LAB_TEST_DRAPE,
+           "ISO 9073-9 (Cusick): the shadow of a disc over a smaller one");
 }
 
 }  // namespace weft::client

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -9,13 +10,14 @@
 
 namespace weft {
 
-// What a textile is put to, each a test with an answer from a textbook.
+// What a textile is put to. All but the drape have an answer from a textbook.
 enum class LabTest {
   kTensile,     // a strip pulled by 1 %: its modulus
   kShear,       // a frame sheared by 1 degree: its modulus
   kBending,     // the bending curve of a connection: f_b, f_b*, the evaluator's, and its error
   kCantilever,  // ASTM D1388: a strip over an edge hangs at 41.5 degrees
   kChain,       // threads without bending between two hooks: an elastic catenary
+  kDrape,       // ISO 9073-9 (Cusick): a disc hangs over a smaller one, its shadow is measured
 };
 
 struct LabOrder {
@@ -32,7 +34,7 @@ struct LabValue {
   std::string unit;
   double spacing = 0;  // m
   int particles = 0;
-  double asked = 0;
+  std::optional<double> asked;  // absent: theory has no answer
   double found = 0;
 };
 

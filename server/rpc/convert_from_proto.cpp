@@ -21,7 +21,8 @@ constexpr std::array kIntegrators = {IntegratorKind::kVerlet, IntegratorKind::kV
                                      IntegratorKind::kEuler, IntegratorKind::kMidpoint,
                                      IntegratorKind::kRk4};
 constexpr std::array kLabTests = {LabTest::kTensile, LabTest::kTensile,    LabTest::kShear,
-                                  LabTest::kBending, LabTest::kCantilever, LabTest::kChain};
+                                  LabTest::kBending, LabTest::kCantilever, LabTest::kChain,
+                                  LabTest::kDrape};
 constexpr std::array kPrecisions = {Precision::kSingle, Precision::kSingle, Precision::kDouble};
 
 std::string at(const std::string& field, int index) {

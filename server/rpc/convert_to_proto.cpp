@@ -276,7 +276,7 @@ v1::LabReport to_proto(const LabOrder& order, const LabReport& report) {
     added->set_unit(value.unit);
     added->set_spacing_m(value.spacing);
     added->set_particles(value.particles);
-    added->set_asked(value.asked);
+    if (value.asked) added->set_asked(*value.asked);
     added->set_found(value.found);
   }
   for (const LabCurve& curve : report.curves) {

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/lab/drape.h"
 #include "core/lab/elastica.h"
 
 namespace weft::testing {
@@ -34,7 +35,7 @@ LabReport run(LabTest test, const BendingLaw& bending, const std::vector<double>
   return run_lab(order);
 }
 
-double relative_error(const LabValue& value) { return value.found / value.asked - 1; }
+double relative_error(const LabValue& value) { return value.found / value.asked.value() - 1; }
 
 TEST(HeavyElastica, FollowsAnIndependentSolution) {
   std::ifstream file(WEFT_TEST_DATA_DIR "/reference/cantilever.csv");
@@ -111,7 +112,7 @@ TEST(Lab, AStripOfHeldWidthMeasuresTheShearConnectionsToo) {
   knit.shear = 500;
   const LabReport report = run(LabTest::kTensile, Isometric{}, {0.025, 0.0125}, knit);
   for (const LabValue& value : named(report, "modulus, clamped width"))
-    EXPECT_NEAR(value.found, knit.tensile_warp + 2 * knit.shear, 0.01 * value.asked)
+    EXPECT_NEAR(value.found, knit.tensile_warp + 2 * knit.shear, 0.01 * value.asked.value())
         << "E + 2 G, up to the strain of 1 %";
   EXPECT_THAT(report.notes, ElementsAre(HasSubstr("E + 2 G")));
 }
@@ -168,6 +169,64 @@ TEST(Lab, OrdersThatCannotBeRunAreRefusedWithFieldValueAndBound) {
   EXPECT_THAT(problems(order), ElementsAre(Field(&Problem::field, "bending")));
   order = {LabTest::kTensile, wool(), Isometric{}, false, {1e-4}};
   EXPECT_THAT(problems(order), ElementsAre(Field(&Problem::message, HasSubstr("particles"))));
+}
+
+// Deflection at radius r of a plate of rigidity B (Poisson's ratio 0) and weight q per area,
+// clamped at radius a and free at b: q r^4 / (64 B) + c0 + c1 r^2 + c2 ln r + c3 r^2 ln r
+// (Timoshenko).
+class AnnularPlate {
+ public:
+  AnnularPlate(double rigidity, double q, double a, double b) : k_(q / (64 * rigidity)) {
+    Eigen::Matrix4d matrix;
+    matrix.row(0) = terms(a);                                     // w = 0
+    matrix.row(1) << 0, 2 * a, 1 / a, a * (2 * std::log(a) + 1);  // w' = 0
+    matrix.row(2) << 0, 2, -1 / (b * b), 2 * std::log(b) + 3;     // no moment: w'' = 0
+    matrix.row(3) << 0, 0, 0, 4 / b;                              // no shear: (w'' + w' / r)' = 0
+    const Eigen::Vector4d load(std::pow(a, 4), 4 * std::pow(a, 3), 12 * b * b, 32 * b);
+    c_ = matrix.partialPivLu().solve(-k_ * load);
+  }
+  double deflection(double r) const { return k_ * std::pow(r, 4) + terms(r).dot(c_); }
+
+ private:
+  static Eigen::RowVector4d terms(double r) { return {1, r * r, std::log(r), r * r * std::log(r)}; }
+  double k_;
+  Eigen::Vector4d c_;
+};
+
+TEST(Lab, AStiffDiscBendsAsAnAnnularPlateDoes) {
+  constexpr double kRigidity = 0.1, kRadius = 0.15, kHeld = 0.09, kSpacing = 0.0075;
+  MeasuredTextile board = wool();
+  board.bend_rigidity_warp = board.bend_rigidity_weft = kRigidity;
+  const Specimen disc = cut_disc(board, Isometric{}, kRadius, kHeld, kSpacing);
+  const Equilibrium rest =
+      find_equilibrium(disc.mesh, disc.held, {0, -kStandardGravity, 0}, disc.start, 1e-8);
+  ASSERT_TRUE(rest.found);
+  const AnnularPlate plate(kRigidity, board.areal_density * kStandardGravity, kHeld, kRadius);
+  double found = 0, asked = 0;
+  for (Eigen::Index i = 0; i < rest.x.cols(); ++i) {
+    if (disc.held[i] != 0) continue;
+    found -= rest.x(1, i);
+    asked += plate.deflection(std::hypot(disc.start(0, i), disc.start(2, i)));
+  }
+  EXPECT_NEAR(found / asked, 1, 0.05);
+}
+
+TEST(Lab, StifferTextilesThrowALargerShadow) {
+  double before = 0;
+  for (const double factor : {1.0, 10.0, 1000.0}) {
+    MeasuredTextile textile = wool();
+    textile.bend_rigidity_warp *= factor;
+    textile.bend_rigidity_weft *= factor;
+    const LabReport report = run(LabTest::kDrape, Isometric{}, {0.02}, textile);
+    ASSERT_EQ(report.values.front().quantity, "drape coefficient");
+    EXPECT_FALSE(report.values.front().asked);
+    EXPECT_GT(report.values.front().found, before);
+    before = report.values.front().found;
+    if (factor == 1) {
+      EXPECT_GE(named(report, "folds").front().found, 3);
+    }
+  }
+  EXPECT_NEAR(before, 100, 0.1);  // a board
 }
 
 }  // namespace

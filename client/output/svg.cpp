@@ -82,8 +82,12 @@ std::pair<Axis, Axis> axes_of(const Plot& plot) {
   x.widen();
   y.widen();
   if (plot.downwards) {  // a picture of a shape: one measure for both
-    const double measure = (x.high - x.low) / (kWidth - kLeft - kRight);
-    y.high = std::max(y.high, y.low + measure * (kHeight - kTop - kBottom));
+    const double width = kWidth - kLeft - kRight, height = kHeight - kTop - kBottom;
+    const double measure = std::max((x.high - x.low) / width, (y.high - y.low) / height);
+    const double more = measure * width - (x.high - x.low);
+    x.low -= more / 2;
+    x.high += more / 2;
+    y.high = y.low + measure * height;
     std::swap(y.low, y.high);
   }
   return {x, y};

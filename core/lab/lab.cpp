@@ -157,23 +157,6 @@ LabReport bending_curve(const LabOrder& order, const LabWatch& watch) {
   return report;
 }
 
-// Pushes against being shortened what pulls against being stretched.
-void resist_compression(Mesh& mesh) {
-  std::vector<Family> pushing;
-  for (const Family& family : mesh.families) {
-    if (family.kind != FamilyKind::kStretch || family.stiffness == 0) continue;
-    // a clamp that rules everywhere: k (l - L) for l < L
-    const double rest = family.rest_length;
-    Family push = family;
-    push.stiffness = 0;
-    push.bend.emplace(ChoiKo{.evaluator = Evaluator::kExact},
-                      2 * family.stiffness * std::pow(rest, 3) / kClampRules, family.stiffness,
-                      rest);
-    pushing.push_back(std::move(push));
-  }
-  mesh.families.insert(mesh.families.end(), pushing.begin(), pushing.end());
-}
-
 // A strip over an edge. Its clamp acts half a spacing inside the last held column, so that
 // (columns + 1/2) spacings make the overhang.
 struct Cantilever {

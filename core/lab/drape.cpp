@@ -153,8 +153,7 @@ void look(const std::string& how, const Specimen& disc, const Matrix3Xd& rest, L
   constexpr int kAngles = 360;
   const Shadow shadow(disc.mesh, rest), flat(disc.mesh, disc.start);
   const double held = std::numbers::pi * kHeldRadius * kHeldRadius;
-  LabCurve outline{
-      join("spacing ", 1000 * disc.sheet.grid.spacing, " mm", how), {"x m", "z m"}, {}};
+  LabCurve outline{join(1000 * disc.sheet.grid.spacing, " mm", how), {"x m", "z m"}, {}};
   std::vector<double> radii;
   for (int k = 0; k <= kAngles; ++k) {
     const double angle = 2 * std::numbers::pi * k / kAngles, radius = shadow.radius(angle);

@@ -1,6 +1,8 @@
 #include <fuzzer/FuzzedDataProvider.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <string>
 
 #include "client/problem.h"
 #include "client/recording/writer.h"
@@ -11,35 +13,45 @@ namespace {
 using weft::v1::Frame;
 using weft::v1::StreamHeader;
 
-// Mostly small, as sheets are that fit into an input.
+// One time in eight anything at all.
+bool is_wild(FuzzedDataProvider& input) { return input.ConsumeIntegralInRange(0, 7) == 7; }
+
 std::int32_t some_size(FuzzedDataProvider& input) {
-  return input.ConsumeBool() ? input.ConsumeIntegralInRange(0, 5)
-                             : input.ConsumeIntegral<std::int32_t>();
+  return is_wild(input) ? input.ConsumeIntegral<std::int32_t>()
+                        : input.ConsumeIntegralInRange(1, 4);
 }
 
 StreamHeader some_header(FuzzedDataProvider& input) {
   StreamHeader header;
   header.set_uid("uid");
-  header.set_start_frame(input.ConsumeBool() ? 0 : input.ConsumeIntegral<std::int64_t>());
-  header.set_frame_step_s(input.ConsumeFloatingPoint<double>());
-  header.mutable_format()->set_encoding(
-      static_cast<weft::v1::FrameEncoding>(input.ConsumeIntegralInRange(-1, 3)));
+  if (is_wild(input)) header.set_start_frame(input.ConsumeIntegral<std::int64_t>());
+  header.set_frame_step_s(is_wild(input) ? input.ConsumeFloatingPoint<double>() : 1.0 / 60);
+  header.mutable_format()->set_encoding(static_cast<weft::v1::FrameEncoding>(
+      is_wild(input) ? input.ConsumeIntegral<int>() : input.ConsumeIntegralInRange(1, 2)));
   header.mutable_format()->set_velocities(input.ConsumeBool());
-  std::int32_t particles = 0;
+  std::uint32_t particles = 0;
   for (int sheets = input.ConsumeIntegralInRange(0, 3); sheets > 0; --sheets) {
     auto* sheet = header.add_sheets();
-    sheet->set_name(input.ConsumeBool() ? "sheet" : input.ConsumeRandomLengthString(8));
-    sheet->set_first_particle(input.ConsumeBool() ? particles : some_size(input));
+    sheet->set_name(is_wild(input) ? input.ConsumeRandomLengthString(8) : "sheet");
+    sheet->set_first_particle(is_wild(input) ? input.ConsumeIntegral<std::int32_t>()
+                                             : static_cast<std::int32_t>(particles));
     sheet->set_rows(some_size(input));
     sheet->set_columns(some_size(input));
-    particles += static_cast<std::int32_t>(std::int64_t{sheet->rows()} * sheet->columns());
+    particles +=
+        static_cast<std::uint32_t>(sheet->rows()) * static_cast<std::uint32_t>(sheet->columns());
   }
   return header;
 }
 
-std::string some_array(FuzzedDataProvider& input) {
-  const std::size_t values = input.ConsumeIntegralInRange<std::size_t>(0, 80);
-  return input.ConsumeBytesAsString(values * (input.ConsumeBool() ? 4 : 8));
+std::string some_array(FuzzedDataProvider& input, const StreamHeader& header) {
+  std::size_t values = 0;
+  for (const auto& sheet : header.sheets())
+    values +=
+        3 * static_cast<std::uint16_t>(sheet.rows()) * static_cast<std::uint16_t>(sheet.columns());
+  const bool doubles = header.format().encoding() == weft::v1::FRAME_ENCODING_FLOAT64;
+  std::string bytes = input.ConsumeRandomLengthString();
+  if (!is_wild(input)) bytes.resize(std::min<std::size_t>(values, 1000) * (doubles ? 8 : 4));
+  return bytes;
 }
 
 }  // namespace
@@ -53,10 +65,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     weft::client::RecordingWriter writer(scratch.file(), true, {}, header);
     for (int count = 0; input.remaining_bytes() > 0; ++count) {
       Frame frame;
-      frame.set_number(input.ConsumeBool() ? count : input.ConsumeIntegral<std::int64_t>());
-      frame.set_time_s(input.ConsumeFloatingPoint<double>());
-      frame.set_positions_m(some_array(input));
-      if (header.format().velocities()) frame.set_velocities_m_per_s(some_array(input));
+      frame.set_number(is_wild(input) ? input.ConsumeIntegral<std::int64_t>() : count);
+      frame.set_time_s(is_wild(input) ? input.ConsumeFloatingPoint<double>() : count / 60.0);
+      frame.set_positions_m(some_array(input, header));
+      if (header.format().velocities()) frame.set_velocities_m_per_s(some_array(input, header));
       writer.add(frame);
     }
   }

@@ -6,6 +6,8 @@
 #include <condition_variable>
 #include <mutex>
 
+#include "client/recording/points.h"
+
 namespace weft::client {
 namespace {
 
@@ -74,11 +76,21 @@ bool FrameFeed::note(const v1::StreamFramesResponse& message) {
                                 numerics_id_, numerics));
     }
     numerics_id_ = numerics;
+    array_bytes_ = array_bytes(message.header());
     request_.set_uid(message.header().uid());
     if (!request_.has_start_frame()) request_.set_start_frame(message.header().start_frame());
     return !std::exchange(header_seen_, true);
   }
+  if (!header_seen_) {
+    throw Problem(Exit::kRefused, "INTERNAL", "HEADER_MISSING",
+                  "the server sent something else before the header");
+  }
   if (message.has_frame()) {
+    if (!is_whole(message.frame(), array_bytes_, request_.format().velocities())) {
+      throw Problem(Exit::kRefused, "INTERNAL", "FRAME_INCOMPLETE",
+                    fmt::format("the server sent frame {}, but not as long as its header says",
+                                message.frame().number()));
+    }
     if (message.frame().number() != request_.start_frame()) {
       throw Problem(Exit::kRefused, "INTERNAL", "FRAME_OUT_OF_ORDER",
                     fmt::format("the server sent frame {} where frame {} was due",

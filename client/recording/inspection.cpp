@@ -25,10 +25,12 @@ bool is_finite(const v1::Frame& frame, const v1::StreamHeader& header) {
 
 Inspection inspect(RecordingReader& recording,
                    const std::function<void(std::int64_t frame)>& progress) {
+  constexpr std::size_t kMostFaults = 1000;  // beyond this many the list says no more
   Inspection found;
   for (const auto& text : recording.find_damage()) found.faults.push_back({"file", text});
   double last_time = -std::numeric_limits<double>::infinity();
-  for (auto number = recording.first_frame(); number <= recording.last_frame(); ++number) {
+  for (auto number = recording.first_frame();
+       number <= recording.last_frame() && found.faults.size() < kMostFaults; ++number) {
     const auto fault = [&](const std::string& what) {
       found.faults.push_back({fmt::format("frame {}", number), what});
     };

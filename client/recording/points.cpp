@@ -1,7 +1,11 @@
 #include "client/recording/points.h"
 
 #include <bit>
+#include <cstdint>
 #include <cstring>
+#include <limits>
+
+#include "client/problem.h"
 
 namespace weft::client {
 namespace {
@@ -26,6 +30,30 @@ Points read_planes(const std::string& planes, std::size_t first, std::size_t cou
 }
 
 }  // namespace
+
+std::size_t array_bytes(const v1::StreamHeader& header) {
+  constexpr std::int64_t kMostParticles = std::numeric_limits<std::int32_t>::max();
+  std::int64_t particles = 0;
+  bool sound = header.format().encoding() == v1::FRAME_ENCODING_FLOAT32 ||
+               header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
+  for (const auto& sheet : header.sheets()) {
+    sound = sound && sheet.rows() > 0 && sheet.columns() > 0 && sheet.first_particle() == particles;
+    if (!sound) break;
+    particles += std::int64_t{sheet.rows()} * sheet.columns();
+    sound = particles <= kMostParticles;
+  }
+  if (!sound || particles == 0) {
+    throw Problem(Exit::kRefused, "DATA_LOSS", "HEADER_UNREADABLE",
+                  "the header names sheets or a format that no stream has");
+  }
+  const bool doubles = header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
+  return 3 * static_cast<std::size_t>(particles) * (doubles ? sizeof(double) : sizeof(float));
+}
+
+bool is_whole(const v1::Frame& frame, std::size_t array_bytes, bool velocities) {
+  return frame.positions_m().size() == array_bytes &&
+         frame.velocities_m_per_s().size() == (velocities ? array_bytes : 0);
+}
 
 Points read_points(const std::string& planes, v1::FrameEncoding encoding, std::size_t first,
                    std::size_t count) {

@@ -5,6 +5,7 @@
 
 #include "client/problem.h"
 #include "client/recording/layout.h"
+#include "client/recording/points.h"
 
 namespace weft::client {
 namespace {
@@ -12,14 +13,6 @@ namespace {
 std::int64_t pragma(Database& database, std::string_view name) {
   Statement statement = database.prepare(fmt::format("PRAGMA {}", name));
   return statement.step() ? statement.integer(0) : 0;
-}
-
-std::size_t array_bytes(const v1::StreamHeader& header) {
-  std::size_t particles = 0;
-  for (const auto& sheet : header.sheets())
-    particles += static_cast<std::size_t>(sheet.rows()) * static_cast<std::size_t>(sheet.columns());
-  const bool doubles = header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
-  return 3 * particles * (doubles ? sizeof(double) : sizeof(float));
 }
 
 }  // namespace
@@ -46,7 +39,11 @@ RecordingReader::RecordingReader(const std::string& path)
   if (!extent.step() || extent.integer(1) != checksum_of_frame(header_.uid(), extent.integer(0)))
     throw damaged(path, "the checksum of its number of frames is wrong");
   last_frame_ = extent.integer(0);
-  array_bytes_ = array_bytes(header_);
+  try {
+    array_bytes_ = array_bytes(header_);
+  } catch (const Problem& problem) {
+    throw damaged(path, problem.what());
+  }
 }
 
 v1::Frame RecordingReader::read(std::int64_t number) {
@@ -63,11 +60,8 @@ v1::Frame RecordingReader::read(std::int64_t number) {
                      frame.ParseFromString(bytes) && frame.number() == number &&
                      frame.time_s() == row.real(0);
   if (!sound) throw damaged(path_, fmt::format("the checksum of frame {} is wrong", number));
-  const std::size_t velocity_bytes = header_.format().velocities() ? array_bytes_ : 0;
-  if (frame.positions_m().size() != array_bytes_ ||
-      frame.velocities_m_per_s().size() != velocity_bytes) {
+  if (!is_whole(frame, array_bytes_, header_.format().velocities()))
     throw damaged(path_, fmt::format("frame {} is not as long as its header says", number));
-  }
   return frame;
 }
 

@@ -279,6 +279,11 @@ LabOrder Reader::lab_order(const v1::RunTestRequest& from) {
   if (from.test() == v1::LAB_TEST_UNSPECIFIED) problem("test", "is absent; give one");
   if (from.has_textile()) {
     const Textile read = textile(from.textile(), "textile");
+    // the rest is the order's own
+    for (const auto& [field, message] : find_problems(read, "textile")) {
+      if (field == "textile.damping_kg_per_s" || field == "textile.friction_coefficient")
+        problem(field, message);
+    }
     if (const auto* measured = std::get_if<MeasuredTextile>(&read.model)) {
       order.textile = *measured;
     } else {

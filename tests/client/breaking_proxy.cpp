@@ -1,17 +1,21 @@
 #include "tests/client/breaking_proxy.h"
 
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <stdexcept>
+#include <thread>
 
 namespace weft::testing {
 namespace {
 
 constexpr int kPollMs = 20;  // how soon a close is noticed
+constexpr std::chrono::milliseconds kSwallowing{60};
 
 sockaddr_in loopback(int port) {
   sockaddr_in address{};
@@ -50,8 +54,8 @@ void reset(int socket) {
 
 }  // namespace
 
-BreakingProxy::BreakingProxy(const std::string& target, int breaks, std::size_t bytes_each)
-    : target_(target), breaks_left_(breaks), bytes_each_(bytes_each), listener_(open_socket()) {
+BreakingProxy::BreakingProxy(const std::string& target, NetworkFault fault)
+    : target_(target), fault_(fault), breaks_left_(fault.breaks), listener_(open_socket()) {
   sockaddr_in address = loopback(0);
   socklen_t size = sizeof(address);
   if (::bind(listener_, reinterpret_cast<sockaddr*>(&address), size) != 0 ||
@@ -81,30 +85,41 @@ void BreakingProxy::accept_connections() {
   for (auto& relay : relays_) relay.join();
 }
 
+bool BreakingProxy::pass(int from, int to, bool answers, std::size_t& answered) {
+  std::array<char, 4096> buffer{};
+  const ssize_t received = ::recv(from, buffer.data(), buffer.size(), 0);
+  if (received <= 0) return false;
+  const auto size = static_cast<std::size_t>(received);
+  if (!answers) return send_all(to, buffer.data(), size);
+  for (std::size_t begin = 0; begin < size; begin += fault_.slice) {
+    if (fault_.delay.count() > 0) std::this_thread::sleep_for(fault_.delay);
+    if (!send_all(to, buffer.data() + begin, std::min(fault_.slice, size - begin))) return false;
+  }
+  answered += size;
+  return true;
+}
+
 void BreakingProxy::relay(int client) {
   const int server = open_socket();
+  const int at_once = 1;
+  ::setsockopt(client, IPPROTO_TCP, TCP_NODELAY, &at_once, sizeof(at_once));
   const sockaddr_in address = loopback(port_of(target_));
   bool open = ::connect(server, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
   const bool breaks = breaks_left_-- > 0;
+  bool broken = false;
   std::size_t answered = 0;
-  std::array<char, 4096> buffer{};
   std::array<pollfd, 2> ends{pollfd{client, POLLIN, 0}, pollfd{server, POLLIN, 0}};
   while (open && !closed_) {
     ::poll(ends.data(), ends.size(), kPollMs);
-    for (std::size_t i = 0; i < ends.size() && open; ++i) {
-      if (ends[i].revents == 0) continue;
-      const ssize_t received = ::recv(ends[i].fd, buffer.data(), buffer.size(), 0);
-      open = received > 0 &&
-             send_all(ends[1 - i].fd, buffer.data(), static_cast<std::size_t>(received));
-      if (i == 1 && open) answered += static_cast<std::size_t>(received);
-    }
-    if (breaks && answered > bytes_each_) {
-      ++broken_;
-      open = false;
-    }
+    for (std::size_t i = 0; i < ends.size() && open; ++i)
+      if (ends[i].revents != 0) open = pass(ends[i].fd, ends[1 - i].fd, i == 1, answered);
+    broken = breaks && answered > fault_.after_bytes;
+    open = open && !broken;
   }
-  reset(client);
-  reset(server);
+  if (broken) ++broken_;
+  if (broken && fault_.end == NetworkFault::End::kSwallow) std::this_thread::sleep_for(kSwallowing);
+  const bool orderly = broken && fault_.end == NetworkFault::End::kCut;
+  for (const int end : {client, server}) orderly ? void(::close(end)) : reset(end);
 }
 
 }  // namespace weft::testing

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <string>
 #include <thread>
@@ -8,10 +9,24 @@
 
 namespace weft::testing {
 
-// A TCP relay to a server that breaks a number of connections, each after as many bytes of answers.
+// What a network does to answers of a server.
+struct NetworkFault {
+  enum class End {
+    kReset,    // both ends see a reset
+    kCut,      // both see an orderly end
+    kSwallow,  // what is sent is lost in silence for a while, then both see a reset
+  };
+  int breaks = 0;               // connections that end early
+  std::size_t after_bytes = 0;  // of answers, each
+  End end = End::kReset;
+  std::size_t slice = 4096;              // most bytes that are passed on at a time
+  std::chrono::microseconds delay = {};  // before each slice
+};
+
+// A TCP relay to a server, with faults.
 class BreakingProxy {
  public:
-  BreakingProxy(const std::string& target, int breaks, std::size_t bytes_each);
+  explicit BreakingProxy(const std::string& target, NetworkFault fault = {});
   ~BreakingProxy();
 
   const std::string& address() const { return address_; }
@@ -22,12 +37,14 @@ class BreakingProxy {
  private:
   void accept_connections();
   void relay(int client);
+  // Passes on what the other end sent; false where it has ended.
+  bool pass(int from, int to, bool answers, std::size_t& answered);
 
   std::string target_;
   std::string address_;
+  const NetworkFault fault_;
   std::atomic<int> breaks_left_;
   std::atomic<int> broken_ = 0;
-  std::size_t bytes_each_;
   std::atomic<bool> closed_ = false;
   int listener_;
   std::thread acceptor_;

@@ -101,7 +101,7 @@ TEST_F(LoadTest, CountsErrorsByReason) {
 
 TEST_F(LoadTest, FramesThatAStreamDidNotBringAreLost) {
   // of calls, of a hundred streams, and of one more: the second or third breaks, the other goes on
-  const BreakingProxy proxy(address_, 2, 8'000);
+  const BreakingProxy proxy(address_, {.breaks = 2, .after_bytes = 8'000});
   const Outcome outcome =
       run_weft({"load", "--scene", scene_file(small_scene()), "--drive", "free", "--sessions", "1",
                 "--subscribers", "101", "--ramp", "0", "--frames", "100", "--duration", "60",

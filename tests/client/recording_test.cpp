@@ -120,9 +120,16 @@ TEST_F(RecordingTest, OfASolverThatGaveUpHasEveryGoodFrame) {
   expect_equal(recorded(file_), stream("sessions/wild", 0, last));
 }
 
-TEST_F(RecordingTest, ResumesBrokenConnectionsWithEveryFrameOnce) {
-  constexpr std::int64_t kFrames = 400;
-  const BreakingProxy proxy(address_, 4, 30'000);
+struct NamedFault {
+  const char* name;
+  NetworkFault fault;
+};
+
+class BadNetwork : public RecordingTest, public ::testing::WithParamInterface<NamedFault> {};
+
+TEST_P(BadNetwork, LosesAndDoublesNoFrame) {
+  constexpr std::int64_t kFrames = 300;
+  const BreakingProxy proxy(address_, GetParam().fault);
   Outcome outcome;
   std::thread recording([&] {
     outcome = run_weft({"record", "cloth", "--to", std::to_string(kFrames), "-o", file_, "--json",
@@ -132,13 +139,29 @@ TEST_F(RecordingTest, ResumesBrokenConnectionsWithEveryFrameOnce) {
   service_.run(session_, kFrames);
   recording.join();
   ASSERT_EQ(outcome.exit, 0) << outcome.err;
-  EXPECT_EQ(proxy.broken(), 4);
-  EXPECT_GE(outcome.json()["reconnections"], 4);
+  EXPECT_EQ(proxy.broken(), GetParam().fault.breaks);
+  EXPECT_GE(outcome.json()["reconnections"], GetParam().fault.breaks);
   expect_equal(recorded(file_), stream("sessions/cloth", 0, kFrames));
 }
 
+std::vector<NamedFault> network_faults() {
+  using enum NetworkFault::End;
+  using namespace std::chrono_literals;
+  return {
+      {"Resets", {.breaks = 3, .after_bytes = 25'000, .end = kReset}},
+      {"Cuts", {.breaks = 3, .after_bytes = 25'000, .end = kCut}},
+      {"Swallows", {.breaks = 3, .after_bytes = 25'000, .end = kSwallow}},
+      {"PassesSingleBytes", {.breaks = 1, .after_bytes = 40'000, .slice = 1}},
+      {"Delays", {.breaks = 1, .after_bytes = 40'000, .delay = 10ms}},
+      {"Throttles", {.breaks = 1, .after_bytes = 40'000, .slice = 100, .delay = 100us}},
+  };
+}
+
+INSTANTIATE_TEST_SUITE_P(, BadNetwork, ::testing::ValuesIn(network_faults()),
+                         [](const auto& fault) { return std::string(fault.param.name); });
+
 TEST_F(RecordingTest, GivesUpOnAServerThatIsGoneAndKeepsWhatItHas) {
-  BreakingProxy proxy(address_, 0, 0);
+  BreakingProxy proxy(address_);
   Outcome outcome;
   std::thread recording([&] {
     outcome = run_weft({"record", "cloth", "--to", "99", "--patience", "0", "-o", file_, "--server",

@@ -181,19 +181,31 @@ Error Stream::finish() {
 }
 
 std::pair<std::string, Error> raw_call(Service& service, const std::string& method,
-                                       const std::string& request) {
+                                       const std::string& request, bool streams) {
   grpc::GenericStub stub(service.channel);
   grpc::CompletionQueue queue;
   grpc::ClientContext context;
-  const grpc::Slice slice(request);
-  const auto call = stub.PrepareUnaryCall(&context, method, grpc::ByteBuffer(&slice, 1), &queue);
-  call->StartCall();
+  const auto done = [&queue] {
+    void* tag = nullptr;
+    bool ok = false;
+    EXPECT_TRUE(queue.Next(&tag, &ok));
+    return ok;
+  };
+  const auto call = stub.PrepareCall(&context, method, &queue);
+  call->StartCall(nullptr);
+  if (done()) {
+    const grpc::Slice slice(request);
+    call->WriteLast(grpc::ByteBuffer(&slice, 1), {}, nullptr);
+    done();
+  }
   grpc::ByteBuffer response;
+  call->Read(&response, nullptr);
+  const bool answered = done();
+  if (answered && streams) context.TryCancel();
   grpc::Status status;
-  call->Finish(&response, &status, nullptr);
-  void* tag = nullptr;
-  bool ok = false;
-  EXPECT_TRUE(queue.Next(&tag, &ok));
+  call->Finish(&status, nullptr);
+  done();
+  if (answered && streams) status = grpc::Status::OK;
   grpc::Slice bytes;
   if (response.Valid()) response.DumpToSingleSlice(&bytes);
   return {std::string(bytes.begin(), bytes.end()), Error(status)};

@@ -98,9 +98,9 @@ class Stream {
   std::unique_ptr<grpc::ClientReader<v1::StreamFramesResponse>> reader_;
 };
 
-// A call by bytes alone: what a method answers, and its error.
+// A call by bytes alone: what a method answers first, and its error. A stream is cancelled then.
 std::pair<std::string, Error> raw_call(Service& service, const std::string& method,
-                                       const std::string& request);
+                                       const std::string& request, bool streams = false);
 
 // From `start` on, to `end` where it is not below 0.
 v1::StreamFramesRequest frames_of(const v1::Session& session, std::int64_t start = 0,

@@ -501,7 +501,7 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
 
 Handling Simulation::handling() const { return state_->handling(); }
 
-std::vector<Problem> Simulation::find_problems(const std::vector<Action>& actions) const {
+std::vector<Problem> Simulation::problems_of(const std::vector<Action>& actions) const {
   Handling after = handling();
   return handle(state_->moment(), actions, after);
 }

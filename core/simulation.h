@@ -95,10 +95,10 @@ class Simulation {
   // What holds particles and moves colliders now.
   Handling handling() const;
   // What is wrong with actions, see handle().
-  std::vector<Problem> find_problems(const std::vector<Action>& actions) const;
+  std::vector<Problem> problems_of(const std::vector<Action>& actions) const;
   // Does all of them between two frames, at time(). Particles that are let go keep their velocity.
   // Where pins come or go the step is planned anew: then as set_textile(). Precondition:
-  // find_problems(actions) is empty.
+  // problems_of(actions) is empty.
   std::optional<StepRefusal> act(const std::vector<Action>& actions);
 
  private:

@@ -46,7 +46,7 @@ void add_act(CLI::App& app, Context& context) {
     return std::pair(command, options);
   };
   const auto add_particle = [&](const char* kind, const char* description) {
-    const auto added = add(kind, kind, description);
+    auto added = add(kind, kind, description);
     added.first->add_option("PARTICLE", added.second->particle, "ROW,COLUMN or SHEET:ROW,COLUMN")
         ->option_text(" ")
         ->required();
@@ -59,7 +59,7 @@ void add_act(CLI::App& app, Context& context) {
                      "How long it takes, at 20 m/s at most; else a frame or longer")
         ->type_name("SECONDS");
     return command->add_option("--to", options->target_m, description)
-        ->type_name("X,Y,Z")
+        ->option_text("X,Y,Z")
         ->delimiter(',')
         ->expected(3);
   };

@@ -419,7 +419,7 @@ void Session::execute(SetTextile command) {
 }
 
 void Session::execute(Act command) {
-  auto problems = simulation_.find_problems(command.actions);
+  auto problems = simulation_.problems_of(command.actions);
   std::optional<Refusal> refusal;
   {
     std::lock_guard lock(mutex_);

@@ -87,7 +87,7 @@ steps:
   - release: {row: 3, column: 0}
   - unpin: {row: 3, column: 4}
   - run: {until_frame: 12}
-  - expect: {particle: {row: 3, column: 0, y_m: {max: -0.001}}}
+  - expect: {particle: {row: 3, column: 0, x_m: {max: 0.249}}}
 )";
   EXPECT_EQ(ask({"script", script(text)})["failed"], 0);
   const std::string told = refusal(R"(steps:

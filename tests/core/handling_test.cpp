@@ -30,7 +30,7 @@ Action drag(int particle, const Vector3d& target, std::optional<double> duration
 }
 
 void expect_done(Simulation& simulation, const std::vector<Action>& actions) {
-  for (const auto& [field, message] : simulation.find_problems(actions))
+  for (const auto& [field, message] : simulation.problems_of(actions))
     ADD_FAILURE() << field << ": " << message;
   EXPECT_FALSE(simulation.act(actions));
 }
@@ -181,7 +181,7 @@ TEST(Handling, SaysWhatIsWrongWithActions) {
   Simulation simulation(scene);
   const Matrix3Xd x = positions(simulation);
   const auto problem = [&](const Action& action) {
-    const auto problems = simulation.find_problems({act(Kind::kGrab, 9), action});
+    const auto problems = simulation.problems_of({act(Kind::kGrab, 9), action});
     return problems.empty() ? "" : problems[0].field + ": " + problems[0].message;
   };
   EXPECT_EQ(problem(act(Kind::kGrab, 49)), "actions[1].grab.particle: 49 is not within 0 to 48");

@@ -69,6 +69,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_run(app, context);
   add_pause(app, context);
   add_step(app, context);
+  add_act(app, context);
   add_watch(app, context);
   add_top(app, context);
   add_record(app, context);

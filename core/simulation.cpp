@@ -58,11 +58,17 @@ void lead_pins(const SheetDefinition& definition, double time, double dt, Sheet&
   }
 }
 
+// 1/kg, 0 where a pin holds a particle.
+VectorXd inverse_mass_of(const Mesh& mesh, const std::vector<Pin>& pins) {
+  VectorXd inverse_mass = mesh.mass.cwiseInverse();
+  for (const Pin& pin : pins)
+    for (const int i : pin.particles) inverse_mass[i] = 0;
+  return inverse_mass;
+}
+
 void set_textile_of(const Scene& scene, const SheetDefinition& definition, Sheet& sheet) {
   sheet.mesh = make_lattice(definition);
-  sheet.dynamics.inverse_mass = sheet.mesh.mass.cwiseInverse();
-  for (const Pin& pin : definition.pins)
-    for (const int i : pin.particles) sheet.dynamics.inverse_mass[i] = 0;
+  sheet.dynamics.inverse_mass = inverse_mass_of(sheet.mesh, definition.pins);
   sheet.dynamics.drag = sheet.mesh.drag.maxCoeff() > 0 ? sheet.mesh.drag : VectorXd();
   sheet.dynamics.gravity = scene.environment.gravity;
   sheet.skin = definition.skin.value_or(definition.grid.spacing / 10);
@@ -80,6 +86,18 @@ double end_of_paths(const Scene& scene) {
   return end;
 }
 
+// Positions and velocities of all sheets, as they go on with other forces or another step.
+struct Course {
+  std::vector<Matrix3Xd> x, v;
+};
+
+// Gives led particles the velocity of their paths in a step from `time` on.
+void set_led_velocities(const std::vector<Pin>& pins, double time, double dt, Matrix3Xd& v) {
+  for (const Pin& pin : pins)
+    for (const int i : pin.particles)
+      v.col(i) = (offset_at(pin.path, time + dt) - offset_at(pin.path, time)) / dt;
+}
+
 }  // namespace
 
 std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefinition& sheet,
@@ -94,6 +112,7 @@ struct Simulation::State {
   SolverFactory make_solver;
   Plan plan;
   std::vector<Sheet> sheets;
+  std::vector<Grab> grabs;  // their pins are among the scene's
   std::int64_t frame = 0;
   int frames_at_rest = 0;
   std::int64_t substeps = 0;  // of the last frame
@@ -110,6 +129,12 @@ struct Simulation::State {
   Attempt attempt(Crew& crew);
   bool quiet() const;
   void set_halvings(int count);
+  Handling handling() const;
+  Moment moment() const;
+  void adopt(Handling handling);
+  VectorXd planned_inverse_mass(std::size_t sheet) const;
+  Course course() const;
+  void go_on(const Course& course, double old_dt, const std::vector<bool>& changed);
   Plan plan_for(const std::vector<Matrix3Xd>& x) const;
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
 };
@@ -176,9 +201,7 @@ Simulation::State::State(Scene given, SolverFactory factory)
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const SheetDefinition definition = stepped(s);
     Matrix3Xd v = start_velocities(definition);
-    for (const Pin& pin : definition.pins)
-      for (const int i : pin.particles)
-        v.col(i) = (offset_at(pin.path, dt) - offset_at(pin.path, 0)) / dt;
+    set_led_velocities(definition.pins, 0, dt, v);
     sheets[s].solver = make_solver(scene, definition, sheets[s].dynamics);
     sheets[s].solver->start(x[s], v, 0, dt);
     sheets[s].read(sheets[s].good);
@@ -188,16 +211,70 @@ Simulation::State::State(Scene given, SolverFactory factory)
 
 // x: positions of each sheet.
 Plan Simulation::State::plan_for(const std::vector<Matrix3Xd>& x) const {
+  std::vector<VectorXd> inverse_mass;
+  for (std::size_t s = 0; s < sheets.size(); ++s) inverse_mass.push_back(planned_inverse_mass(s));
   std::vector<SheetShape> shapes;
   shapes.reserve(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s)
-    shapes.push_back({sheets[s].mesh, sheets[s].dynamics.inverse_mass, x[s]});
+    shapes.push_back({sheets[s].mesh, inverse_mass[s], x[s]});
   Plan made = make_plan(scene, shapes);
   if (made.step.substeps <= kMaxSubsteps) {  // repairs stay
     made.step.substeps <<= halvings;
     made.step.substep = scene.solver.frame_step / static_cast<double>(made.step.substeps);
   }
   return made;
+}
+
+// 1/kg. What is only grabbed counts as free: no step is longer for that, and none shorter after it.
+VectorXd Simulation::State::planned_inverse_mass(std::size_t sheet) const {
+  VectorXd inverse_mass = sheets[sheet].dynamics.inverse_mass;
+  for (const Grab& grab : grabs)
+    if (grab.sheet == sheet && !grab.pinned)
+      inverse_mass[grab.particle] = 1 / sheets[sheet].mesh.mass[grab.particle];
+  return inverse_mass;
+}
+
+Handling Simulation::State::handling() const {
+  Handling handling{{}, {}, grabs};
+  for (const SheetDefinition& sheet : scene.sheets) handling.pins.push_back(sheet.pins);
+  for (const Collider& collider : scene.colliders) handling.paths.push_back(collider.path);
+  return handling;
+}
+
+void Simulation::State::adopt(Handling handling) {
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    scene.sheets[s].pins = std::move(handling.pins[s]);
+    sheets[s].dynamics.inverse_mass = inverse_mass_of(sheets[s].mesh, scene.sheets[s].pins);
+  }
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
+    scene.colliders[c].path = std::move(handling.paths[c]);
+  grabs = std::move(handling.grabs);
+  rest_after = end_of_paths(scene);
+}
+
+Moment Simulation::State::moment() const {
+  return {scene, time(), [this](std::size_t s, int i) { return sheets[s].start.col(i); },
+          [this](std::size_t s, int i) { return sheets[s].good.x.col(i); }};
+}
+
+Course Simulation::State::course() const {
+  Course course;
+  for (const Sheet& sheet : sheets) {
+    course.x.push_back(sheet.good.x);
+    sheet.solver->closing_velocities(time(), course.v.emplace_back());
+  }
+  return course;
+}
+
+// Sheets whose forces and step stay go on as they were.
+void Simulation::State::go_on(const Course& course, double old_dt,
+                              const std::vector<bool>& changed) {
+  const double dt = plan.step.substep;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    if (!changed[s] && dt == old_dt) continue;
+    sheets[s].solver->start(course.x[s], course.v[s], time(), dt);
+    sheets[s].read(sheets[s].good);
+  }
 }
 
 // Whether in the frame being computed kinetic energy and mean net forces, contact included, were
@@ -403,32 +480,85 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
   if (definition.textile == textile) return std::nullopt;
 
   const double dt = state.plan.step.substep;
-  std::vector<Matrix3Xd> x(state.sheets.size()), v(state.sheets.size());
-  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
-    x[s] = state.sheets[s].good.x;
-    state.sheets[s].solver->closing_velocities(state.time(), v[s]);
-  }
-
+  const Course course = state.course();
   const Textile old_textile = std::exchange(definition.textile, textile);
   set_textile_of(state.scene, state.stepped(index), state.sheets[index]);
-  Plan plan = state.plan_for(x);
+  Plan plan = state.plan_for(course.x);
   if (const auto refused = refusal_of(plan.step, state.scene.solver.allow_unstable)) {
     definition.textile = old_textile;
     set_textile_of(state.scene, state.stepped(index), state.sheets[index]);
     return refused;
   }
   state.plan = std::move(plan);
+  state.sheets[index].solver =
+      state.make_solver(state.scene, state.stepped(index), state.sheets[index].dynamics);
+  std::vector<bool> changed(state.sheets.size());
+  changed[index] = true;
+  state.go_on(course, dt, changed);
+  state.frames_at_rest = 0;
+  return std::nullopt;
+}
 
-  // sheets whose forces and step stay go on as they were
-  const double new_dt = state.plan.step.substep;
-  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
-    Sheet& sheet = state.sheets[s];
-    if (s == index)
-      sheet.solver = state.make_solver(state.scene, state.stepped(index), sheet.dynamics);
-    if (s != index && new_dt == dt) continue;
-    sheet.solver->start(x[s], v[s], state.time(), new_dt);
-    sheet.read(sheet.good);
+Handling Simulation::handling() const { return state_->handling(); }
+
+std::vector<Problem> Simulation::problems_of(const std::vector<Action>& actions) const {
+  Handling after = handling();
+  return handle(state_->moment(), actions, after);
+}
+
+namespace {
+
+bool holds_the_same(const Handling& one, const Handling& other) {
+  const auto same_particles = [](const Pin& a, const Pin& b) { return a.particles == b.particles; };
+  const auto same_pins = [&](const std::vector<Pin>& a, const std::vector<Pin>& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), same_particles);
+  };
+  const auto same_grab = [](const Grab& a, const Grab& b) { return a.pinned == b.pinned; };
+  return std::equal(one.pins.begin(), one.pins.end(), other.pins.begin(), same_pins) &&
+         std::equal(one.grabs.begin(), one.grabs.end(), other.grabs.begin(), other.grabs.end(),
+                    same_grab);
+}
+
+}  // namespace
+
+std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
+  State& state = *state_;
+  const Handling before = handling();
+  Handling after = before;
+  [[maybe_unused]] const auto problems = handle(state.moment(), actions, after);
+  assert(problems.empty());
+  if (holds_the_same(before, after)) {
+    state.adopt(std::move(after));
+    state.frames_at_rest = 0;
+    return std::nullopt;
   }
+
+  Course course = state.course();
+  const double dt = state.plan.step.substep;
+  std::vector<VectorXd> held, planned;
+  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
+    held.push_back(state.sheets[s].dynamics.inverse_mass);
+    planned.push_back(state.planned_inverse_mass(s));
+  }
+  state.adopt(std::move(after));
+  std::vector<bool> changed(state.sheets.size());
+  bool plans = false;
+  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
+    changed[s] = state.sheets[s].dynamics.inverse_mass != held[s];
+    plans = plans || state.planned_inverse_mass(s) != planned[s];
+  }
+  if (plans) {
+    Plan plan = state.plan_for(course.x);
+    if (const auto refused = refusal_of(plan.step, state.scene.solver.allow_unstable)) {
+      state.adopt(before);
+      return refused;
+    }
+    state.plan = std::move(plan);
+  }
+  for (std::size_t s = 0; s < state.sheets.size(); ++s)
+    set_led_velocities(state.scene.sheets[s].pins, state.time(), state.plan.step.substep,
+                       course.v[s]);
+  state.go_on(course, dt, changed);
   state.frames_at_rest = 0;
   return std::nullopt;
 }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/handling.h"
 #include "core/model/scene.h"
 #include "core/motion/crew.h"
 #include "core/plan.h"
@@ -63,8 +64,8 @@ class Simulation {
   // computed again from the one before it with half the step; where both attempts agree, the motion
   // is real and the step stays. After scene().solver.max_repairs repairs it returns false for good,
   // with the state of the last good frame. A scene at rest, without wind, sleeps: the frame repeats
-  // without a substep until a textile changes. The crew shares large sheets; frames do not depend
-  // on it.
+  // without a substep until a textile or what holds it changes. The crew shares large sheets;
+  // frames do not depend on it.
   [[nodiscard]] bool advance_frame(Crew& crew = no_crew());
   // More than these have nothing to do in a crew.
   int most_hands() const;
@@ -78,7 +79,7 @@ class Simulation {
   std::int64_t frame() const;
   double time() const;         // s
   bool at_rest() const;        // for 30 frames, see Session.at_rest in the interface
-  bool asleep() const;         // at rest, and nothing will wake it but a new textile
+  bool asleep() const;         // at rest, and nothing will wake it but a change
   int particle_count() const;  // of all sheets
 
   // Planes x, y, z of all sheets in scene order; out has 3 x particle_count values.
@@ -90,6 +91,15 @@ class Simulation {
   // planned anew. Changes nothing and returns the refusal when that step must not be run.
   // Precondition: find_problems(textile, "") is empty; index < scene().sheets.size().
   std::optional<StepRefusal> set_textile(std::size_t index, const Textile& textile);
+
+  // What holds particles and moves colliders now.
+  Handling handling() const;
+  // What is wrong with actions, see handle().
+  std::vector<Problem> problems_of(const std::vector<Action>& actions) const;
+  // Does all of them between two frames, at time(). Particles that are let go keep their velocity.
+  // Where pins come or go the step is planned anew: then as set_textile(). Precondition:
+  // problems_of(actions) is empty.
+  std::optional<StepRefusal> act(const std::vector<Action>& actions);
 
  private:
   struct State;

@@ -16,6 +16,7 @@ void add_lab(CLI::App& app, Context& context);
 void add_run(CLI::App& app, Context& context);
 void add_pause(CLI::App& app, Context& context);
 void add_step(CLI::App& app, Context& context);
+void add_act(CLI::App& app, Context& context);
 void add_top(CLI::App& app, Context& context);
 void add_watch(CLI::App& app, Context& context);
 void add_record(CLI::App& app, Context& context);

@@ -125,6 +125,9 @@ constexpr const char* kFooter =
 
 create   template, with the options of `weft scene new`, or scene; fields: {PLACE: VALUE ...}
 set      preset or fields: {FIELD: VALUE ...}; sheet
+grab     row, column; sheet; likewise release, pin and unpin
+drag     row, column; sheet; to_m: [X, Y, Z]; over_s; moves as the session runs on
+move     collider; to_m, an offset from its start; over_s
 record   file; velocities, encoding; to the end of the case
 run      until_frame, until_time_s, until_rest; time_scale; wait: false goes on at once
 wait     frame

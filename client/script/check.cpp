@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "client/scene_file.h"
 
@@ -20,6 +21,7 @@ class Checker {
   void check() {
     for (const Case& each : script_.cases) {
       sessions_.clear();
+      grabbed_.clear();
       for (const Step& step : each.steps)
         std::visit([&](const auto& what) { check_step(step, what); }, step.what);
     }
@@ -81,6 +83,25 @@ class Checker {
               : fmt::format("{} has no sheet \"{}\"", what.session, what.change.sheet));
   }
 
+  void check_step(const Step& step, const ActStep& what) {
+    const auto& session = sessions_[what.session];
+    if (!session) return;
+    v1::Action action;
+    try {
+      action = to_action(what.action, session->scene());
+    } catch (const Problem& problem) {
+      return fault(step, "", problem.what());
+    }
+    const auto particle =
+        std::tuple(what.session, what.action.name, what.action.row, what.action.column);
+    if (action.has_grab() && !grabbed_.insert(particle).second)
+      fault(step, "", "the particle is grabbed already");
+    if (action.has_drag() && !grabbed_.contains(particle))
+      fault(step, "", "the particle was not grabbed before this");
+    if (action.has_release() && grabbed_.erase(particle) == 0)
+      fault(step, "", "the particle was not grabbed before this");
+  }
+
   void check_step(const Step& step, const RecordStep& what) {
     const std::string path =
         std::filesystem::weakly_canonical(std::filesystem::absolute(what.path)).string();
@@ -126,7 +147,9 @@ class Checker {
   Faults faults_;
   std::map<std::string, std::optional<v1::Session>> asked_;
   std::map<std::string, std::optional<v1::Session>> sessions_;  // of the case, as they would be
-  std::set<std::string> files_;                                 // of all cases
+  // Of the case: session, sheet, row, column.
+  std::set<std::tuple<std::string, std::string, int, int>> grabbed_;
+  std::set<std::string> files_;  // of all cases
 };
 
 }  // namespace

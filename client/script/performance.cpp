@@ -137,6 +137,14 @@ class Performer {
     connection_.call(&Sessions::UpdateTextile, textile_request(now, what.change));
   }
 
+  void do_step(const Step&, const ActStep& what) {
+    const v1::Session& session = actors_.at(what.session).session;
+    v1::ApplyActionsRequest request;
+    request.set_name(session.name());
+    *request.add_actions() = to_action(what.action, session.scene());
+    connection_.call(&Sessions::ApplyActions, request);
+  }
+
   void do_step(const Step&, const RunStep& what) {
     std::vector<Actor*> started;
     for (const std::string& name : what.sessions) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/problem.h"
+#include "client/scene_action.h"
 #include "client/textile_change.h"
 #include "weft/v1/frame.pb.h"
 #include "weft/v1/scene.pb.h"
@@ -39,6 +40,11 @@ struct RunStep {
 struct WaitStep {
   std::string session;
   std::int64_t frame = 0;
+};
+
+struct ActStep {
+  std::string session;
+  SceneAction action;
 };
 
 struct PauseStep {
@@ -86,7 +92,8 @@ struct ExpectStep {
 struct Step {
   int line = 0;
   std::string kind;  // "create"
-  std::variant<CreateStep, SetStep, RunStep, WaitStep, PauseStep, RecordStep, ExpectStep> what;
+  std::variant<CreateStep, SetStep, ActStep, RunStep, WaitStep, PauseStep, RecordStep, ExpectStep>
+      what;
 };
 
 struct Case {

@@ -321,6 +321,33 @@ class ScriptReader {
     return step;
   }
 
+  // "grab" ... of a particle, or "move" of a collider.
+  What read_act(Fields& fields, Scope&) {
+    ActStep step{.session = read_session(fields), .action = {.kind = fields.place("")}};
+    SceneAction& action = step.action;
+    const bool moves = action.kind == "move";
+    if (moves) {
+      action.kind = "move_collider";
+      action.name = fields.text("collider").value_or("");
+    } else {
+      action.name = fields.text("sheet").value_or("");
+      action.row = static_cast<int>(fields.whole_number("row", 0, 4095).value_or(0));
+      action.column = static_cast<int>(fields.whole_number("column", 0, 4095).value_or(0));
+      for (const char* key : {"row", "column"}) {
+        if (!fields.has(key)) fields.fault("", std::string(key) + " is missing");
+      }
+    }
+    if (!moves && action.kind != "drag") return step;
+    std::vector<double> target;
+    for (const std::string& text : fields.texts("to_m")) {
+      if (const auto number = read_number(text)) target.push_back(*number);
+    }
+    if (target.size() == 3) action.target_m = {target[0], target[1], target[2]};
+    if (!action.target_m) fields.fault("to_m", "give [x, y, z]");
+    action.duration_s = fields.number("over_s", 1e-6, 1e4);
+    return step;
+  }
+
   What read_wait(Fields& fields, Scope&) {
     WaitStep step{.session = read_session(fields)};
     const auto frame = fields.whole_number("frame", 0, kLastFrame);
@@ -429,13 +456,19 @@ class ScriptReader {
     const char* name;
     What (ScriptReader::*read)(Fields&, Scope&);
   };
-  static constexpr std::array<Kind, 7> kKinds{{{"create", &ScriptReader::read_create},
-                                               {"set", &ScriptReader::read_set},
-                                               {"run", &ScriptReader::read_run},
-                                               {"wait", &ScriptReader::read_wait},
-                                               {"pause", &ScriptReader::read_pause},
-                                               {"record", &ScriptReader::read_record},
-                                               {"expect", &ScriptReader::read_expect}}};
+  static constexpr std::array<Kind, 13> kKinds{{{"create", &ScriptReader::read_create},
+                                                {"set", &ScriptReader::read_set},
+                                                {"grab", &ScriptReader::read_act},
+                                                {"drag", &ScriptReader::read_act},
+                                                {"release", &ScriptReader::read_act},
+                                                {"pin", &ScriptReader::read_act},
+                                                {"unpin", &ScriptReader::read_act},
+                                                {"move", &ScriptReader::read_act},
+                                                {"run", &ScriptReader::read_run},
+                                                {"wait", &ScriptReader::read_wait},
+                                                {"pause", &ScriptReader::read_pause},
+                                                {"record", &ScriptReader::read_record},
+                                                {"expect", &ScriptReader::read_expect}}};
 
   std::string path_;
   const std::map<std::string, std::string>& given_;

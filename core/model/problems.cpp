@@ -2,6 +2,7 @@
 #include <cmath>
 #include <set>
 
+#include "core/model/handling.h"
 #include "core/model/scene.h"
 
 namespace weft {
@@ -236,6 +237,15 @@ std::vector<Problem> find_problems(const Scene& scene) {
   }
   check_environment(scene.environment, check);
   check_solver(scene.solver, check);
+  return check.take();
+}
+
+std::vector<Problem> find_problems(const Action& action, const std::string& field) {
+  Check check;
+  if (action.kind == Action::Kind::kDrag) check.position(field + ".target_m", action.target);
+  if (action.kind == Action::Kind::kMoveCollider)
+    check.position(field + ".offset_m", action.target);
+  if (action.duration) check.number(field + ".duration_s", *action.duration, 1e-6, 1e4, "s");
   return check.take();
 }
 

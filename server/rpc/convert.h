@@ -29,6 +29,9 @@ Converted<Textile> to_textile(const v1::Textile& textile, const std::string& fie
 Converted<Textile> merge_textile(const Textile& current, const v1::Textile& change,
                                  const google::protobuf::FieldMask& mask);
 
+// An action of a call's hand. What is wrong with its numbers depends on the session.
+Converted<Action> to_action(const v1::Action& action, const std::string& field);
+
 // A test that can be run.
 Converted<LabOrder> to_lab_order(const v1::RunTestRequest& request);
 
@@ -44,6 +47,8 @@ v1::Scene as_given(const Scene& scene);
 
 v1::Plan to_proto(const Plan& plan);
 v1::Repair to_proto(const Repair& repair);
+// Precondition: it is not kLetGo.
+v1::Action to_proto(const Action& action);
 v1::LabReport to_proto(const LabOrder& order, const LabReport& report);
 v1::SessionState to_proto(SessionState state);
 

@@ -351,6 +351,45 @@ Converted<Textile> to_textile(const v1::Textile& textile, const std::string& fie
   return problems;
 }
 
+Converted<Action> to_action(const v1::Action& action, const std::string& field) {
+  const auto of_particle = [](Action::Kind kind, const auto& from) {
+    return Action{.kind = kind, .name = from.sheet(), .particle = from.particle()};
+  };
+  const auto lead = [](Action& led, const v1::Vector3& target, const auto& from) {
+    led.target = vector(target);
+    if (from.has_duration_s()) led.duration = from.duration_s();
+  };
+  const auto absent = [&](const char* what, const char* choices) {
+    return std::vector<Problem>{{field + what, std::string("is absent; give ") + choices}};
+  };
+  switch (action.action_case()) {
+    case v1::Action::kGrab:
+      return of_particle(Action::Kind::kGrab, action.grab());
+    case v1::Action::kDrag: {
+      if (!action.drag().has_target_m()) return absent(".drag.target_m", "where it leads to");
+      Action drag = of_particle(Action::Kind::kDrag, action.drag());
+      lead(drag, action.drag().target_m(), action.drag());
+      return drag;
+    }
+    case v1::Action::kRelease:
+      return of_particle(Action::Kind::kRelease, action.release());
+    case v1::Action::kPin:
+      return of_particle(Action::Kind::kPin, action.pin());
+    case v1::Action::kUnpin:
+      return of_particle(Action::Kind::kUnpin, action.unpin());
+    case v1::Action::kMoveCollider: {
+      const auto& from = action.move_collider();
+      if (!from.has_offset_m()) return absent(".move_collider.offset_m", "where it is moved to");
+      Action move{.kind = Action::Kind::kMoveCollider, .name = from.collider()};
+      lead(move, from.offset_m(), from);
+      return move;
+    }
+    case v1::Action::ACTION_NOT_SET:
+      break;
+  }
+  return absent("", "grab, drag, release, pin, unpin or move_collider");
+}
+
 Converted<LabOrder> to_lab_order(const v1::RunTestRequest& request) {
   Reader reader;
   const LabOrder read = reader.lab_order(request);

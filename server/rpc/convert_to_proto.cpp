@@ -303,4 +303,41 @@ v1::SessionState to_proto(SessionState state) {
   return v1::SESSION_STATE_UNSPECIFIED;
 }
 
+v1::Action to_proto(const Action& action) {
+  v1::Action to;
+  const auto of_particle = [&](auto* part) {
+    part->set_sheet(action.name);
+    part->set_particle(action.particle);
+  };
+  const auto lead = [&](v1::Vector3* target, auto* part) {
+    set(target, action.target);
+    if (action.duration) part->set_duration_s(*action.duration);
+  };
+  switch (action.kind) {
+    case Action::Kind::kGrab:
+      of_particle(to.mutable_grab());
+      break;
+    case Action::Kind::kDrag:
+      of_particle(to.mutable_drag());
+      lead(to.mutable_drag()->mutable_target_m(), to.mutable_drag());
+      break;
+    case Action::Kind::kRelease:
+      of_particle(to.mutable_release());
+      break;
+    case Action::Kind::kPin:
+      of_particle(to.mutable_pin());
+      break;
+    case Action::Kind::kUnpin:
+      of_particle(to.mutable_unpin());
+      break;
+    case Action::Kind::kMoveCollider:
+      to.mutable_move_collider()->set_collider(action.name);
+      lead(to.mutable_move_collider()->mutable_offset_m(), to.mutable_move_collider());
+      break;
+    case Action::Kind::kLetGo:
+      break;
+  }
+  return to;
+}
+
 }  // namespace weft

@@ -87,6 +87,7 @@ void SessionService::end(const std::shared_ptr<Creation>& creation) {
 }
 
 void SessionService::drain() {
+  interactions_.drain();
   std::lock_guard lock(mutex_);
   for (const auto& creation : creations_) creation->answer(errors::server_draining());
 }

@@ -5,6 +5,7 @@
 
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
+#include "server/rpc/interaction.h"
 #include "server/rpc/names.h"
 #include "server/rpc/unary_call.h"
 
@@ -15,47 +16,6 @@ grpc::ServerUnaryReactor* answer(grpc::CallbackServerContext* context, const grp
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(status);
   return reactor;
-}
-
-grpc::Status to_status(const Refusal& refusal, const Session& session) {
-  const std::string name = session_name(session.id());
-  const std::string frame = std::to_string(refusal.frame);
-  const errors::Metadata latest = {{"latest_frame", frame}};
-  switch (refusal.why) {
-    case Refusal::Why::kDeleted:
-      return errors::session_not_found(name);
-    case Refusal::Why::kDraining:
-      return errors::server_draining({{"last_frame", frame}});
-    case Refusal::Why::kBusy:
-      return errors::exhausted("commands", "too many calls wait for " + name, true);
-    case Refusal::Why::kRunning:
-      return errors::failed_precondition(
-          "SESSION_RUNNING", name + " runs by itself; pause it before stepping", latest);
-    case Refusal::Why::kFailed:
-      return errors::solver_failed(session.status().failure, refusal.frame);
-    case Refusal::Why::kStale:
-      return errors::aborted("FRAME_STALE", "expected_frame is not the newest frame, " + frame,
-                             latest);
-    case Refusal::Why::kNotAhead:
-      return errors::field_invalid("until_frame",
-                                   "does not lie ahead of the newest frame, " + frame);
-    case Refusal::Why::kInterrupted:
-      return errors::aborted("STEP_INTERRUPTED", name + " was paused after frame " + frame, latest);
-    case Refusal::Why::kCancelled:
-      return errors::cancelled();
-    case Refusal::Why::kInvalid:
-      return errors::field_invalid(refusal.problems);
-    case Refusal::Why::kRequestUsed:
-      return errors::request_used();
-    case Refusal::Why::kNotKept:
-      return errors::store_unwritable(refusal.text);
-    case Refusal::Why::kUnstable:
-      break;
-  }
-  if (!refusal.step.too_many_substeps) return errors::step_unstable(refusal.step, "textile");
-  return errors::field_invalid("textile", "a frame would need more than " +
-                                              std::to_string(kMaxSubsteps) +
-                                              " substeps, the most that are computed");
 }
 
 // Submits a command under the caller's name for it, and finishes the call with what becomes of it;
@@ -95,6 +55,47 @@ std::variant<std::size_t, grpc::Status> find_sheet(const Scene& scene, const std
 }
 
 }  // namespace
+
+grpc::Status to_status(const Refusal& refusal, const Session& session) {
+  const std::string name = session_name(session.id());
+  const std::string frame = std::to_string(refusal.frame);
+  const errors::Metadata latest = {{"latest_frame", frame}};
+  switch (refusal.why) {
+    case Refusal::Why::kDeleted:
+      return errors::session_not_found(name);
+    case Refusal::Why::kDraining:
+      return errors::server_draining({{"last_frame", frame}});
+    case Refusal::Why::kBusy:
+      return errors::exhausted("commands", "too many calls wait for " + name, true);
+    case Refusal::Why::kRunning:
+      return errors::failed_precondition(
+          "SESSION_RUNNING", name + " runs by itself; pause it before stepping", latest);
+    case Refusal::Why::kFailed:
+      return errors::solver_failed(session.status().failure, refusal.frame);
+    case Refusal::Why::kStale:
+      return errors::aborted("FRAME_STALE", "expected_frame is not the newest frame, " + frame,
+                             latest);
+    case Refusal::Why::kNotAhead:
+      return errors::field_invalid("until_frame",
+                                   "does not lie ahead of the newest frame, " + frame);
+    case Refusal::Why::kInterrupted:
+      return errors::aborted("STEP_INTERRUPTED", name + " was paused after frame " + frame, latest);
+    case Refusal::Why::kCancelled:
+      return errors::cancelled();
+    case Refusal::Why::kInvalid:
+      return errors::field_invalid(refusal.problems);
+    case Refusal::Why::kRequestUsed:
+      return errors::request_used();
+    case Refusal::Why::kNotKept:
+      return errors::store_unwritable(refusal.text);
+    case Refusal::Why::kUnstable:
+      break;
+  }
+  if (!refusal.step.too_many_substeps) return errors::step_unstable(refusal.step, refusal.text);
+  return errors::field_invalid(refusal.text, "a frame would need more than " +
+                                                 std::to_string(kMaxSubsteps) +
+                                                 " substeps, the most that are computed");
+}
 
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
                                                      const v1::GetSessionRequest* request,
@@ -205,6 +206,40 @@ grpc::ServerUnaryReactor* SessionService::UpdateTextile(grpc::CallbackServerCont
                   *response->mutable_textile() = to_proto(applied.textile);
                   *response->mutable_plan() = to_proto(*applied.plan);
                 });
+}
+
+grpc::ServerUnaryReactor* SessionService::ApplyActions(grpc::CallbackServerContext* context,
+                                                       const v1::ApplyActionsRequest* request,
+                                                       v1::ApplyActionsResponse* response) {
+  constexpr int kMost = 1000;
+  const auto found = find_session(backend_.registry, request->name());
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
+  if (request->actions_size() < 1 || request->actions_size() > kMost) {
+    return answer(context,
+                  errors::field_invalid("actions", std::to_string(request->actions_size()) +
+                                                       " elements are not within 1 to 1000"));
+  }
+  Act command;
+  std::vector<Problem> problems;
+  for (int i = 0; i < request->actions_size(); ++i) {
+    const auto action = to_action(request->actions(i), "actions[" + std::to_string(i) + "]");
+    if (const auto* wrong = std::get_if<std::vector<Problem>>(&action)) {
+      problems.insert(problems.end(), wrong->begin(), wrong->end());
+    } else {
+      command.actions.push_back(std::get<Action>(action));
+    }
+  }
+  if (!problems.empty()) return answer(context, errors::field_invalid(problems));
+  return submit(backend_.calls, context, *request, std::get<std::shared_ptr<Session>>(found),
+                std::move(command),
+                [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
+}
+
+grpc::ServerBidiReactor<v1::InteractRequest, v1::InteractResponse>* SessionService::Interact(
+    grpc::CallbackServerContext*) {
+  const auto interaction = std::make_shared<Interaction>(backend_, interactions_);
+  interaction->start();
+  return interaction.get();
 }
 
 grpc::ServerUnaryReactor* SessionService::StepSession(grpc::CallbackServerContext* context,

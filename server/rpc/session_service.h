@@ -6,9 +6,13 @@
 #include <string>
 
 #include "server/rpc/backend.h"
+#include "server/rpc/interaction.h"
 #include "weft/v1/session.grpc.pb.h"
 
 namespace weft {
+
+// Why a session did not carry a command out.
+grpc::Status to_status(const Refusal& refusal, const Session& session);
 
 class SessionService final : public v1::SessionService::CallbackService {
  public:
@@ -39,7 +43,13 @@ class SessionService final : public v1::SessionService::CallbackService {
                                          const v1::PauseSessionRequest* request,
                                          v1::PauseSessionResponse* response) override;
 
-  // Answers every creation under way: the server is going down.
+  grpc::ServerUnaryReactor* ApplyActions(grpc::CallbackServerContext* context,
+                                         const v1::ApplyActionsRequest* request,
+                                         v1::ApplyActionsResponse* response) override;
+  grpc::ServerBidiReactor<v1::InteractRequest, v1::InteractResponse>* Interact(
+      grpc::CallbackServerContext* context) override;
+
+  // Answers every creation and ends every interaction under way: the server is going down.
   void drain();
 
  private:
@@ -53,6 +63,7 @@ class SessionService final : public v1::SessionService::CallbackService {
                     v1::ListSessionsResponse& response) const;
 
   Backend& backend_;
+  Interactions interactions_{static_cast<std::size_t>(backend_.limits.max_streams)};
   std::mutex mutex_;
   std::set<std::shared_ptr<Creation>> creations_;  // guarded by mutex_
 };

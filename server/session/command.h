@@ -28,7 +28,7 @@ struct Refusal {
     kInterrupted,  // the step was paused
     kCancelled,    // the caller went away
     kInvalid,      // see problems
-    kUnstable,     // see step
+    kUnstable,     // see step, and text for the field to blame
     kRequestUsed,  // the request's id was given to another call
     kNotKept,      // its log cannot be written, see text
   };
@@ -90,6 +90,13 @@ struct SetTextile {
   Done done;
 };
 
-using Command = std::variant<StepCommand, RunCommand, PauseCommand, SetTextile>;
+// Handles the scene: all of the actions or none.
+struct Act {
+  std::vector<Action> actions;
+  Request request;
+  Done done;
+};
+
+using Command = std::variant<StepCommand, RunCommand, PauseCommand, SetTextile, Act>;
 
 }  // namespace weft

@@ -6,7 +6,9 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
+#include "core/model/handling.h"
 #include "core/model/textile.h"
 #include "server/session/request.h"
 
@@ -28,7 +30,10 @@ struct TextileSet {
   std::size_t sheet = 0;
   Textile textile;
 };
-using Event = std::variant<StepsBegun, StepsEnded, RunBegun, Paused, TextileSet>;
+struct Acted {
+  std::vector<Action> actions;  // of one hand
+};
+using Event = std::variant<StepsBegun, StepsEnded, RunBegun, Paused, TextileSet, Acted>;
 
 // Something that was done to a session when `frame` was its newest.
 struct LogEntry {

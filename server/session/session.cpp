@@ -7,6 +7,7 @@
 #include <limits>
 #include <new>
 #include <random>
+#include <set>
 #include <sstream>
 
 #include "server/session/frame_crew.h"
@@ -26,6 +27,13 @@ std::vector<Textile> textiles_of(const Scene& scene) {
   std::vector<Textile> textiles;
   for (const auto& sheet : scene.sheets) textiles.push_back(sheet.textile);
   return textiles;
+}
+
+// Whether the command has no caller who could send it again.
+bool must_be_taken(const Command& command) {
+  const auto* act = std::get_if<Act>(&command);
+  return act != nullptr && !act->actions.empty() &&
+         act->actions.front().kind == Action::Kind::kLetGo;
 }
 
 }  // namespace
@@ -86,7 +94,7 @@ void Session::submit(Command command) {
     std::lock_guard lock(mutex_);
     if (closed_) {
       refusal = refuse(*closed_);
-    } else if (commands_.size() + steps_.size() >= kMaxCommands) {
+    } else if (commands_.size() + steps_.size() >= kMaxCommands && !must_be_taken(command)) {
       refusal = refuse(Refusal::Why::kBusy);
     } else {
       commands_.push_back(std::move(command));
@@ -180,6 +188,7 @@ bool Session::settle_restoring() {
     }
     apply_again(entry);
   }
+  let_go_of_streams();
   {
     std::lock_guard lock(mutex_);
     restoring_.reset();
@@ -191,6 +200,18 @@ bool Session::settle_restoring() {
   }
   offer_to_all();
   return true;
+}
+
+// The streams of the past are gone.
+void Session::let_go_of_streams() {
+  std::set<int> hands;
+  for (const Grab& grab : simulation_.handling().grabs) hands.insert(grab.hand);
+  hands.erase(0);
+  std::lock_guard lock(mutex_);
+  for (const int hand : hands) {
+    const Action action{.kind = Action::Kind::kLetGo, .hand = hand};
+    commands_.push_front(Act{{action}, {}, [](const Outcome&) {}});
+  }
 }
 
 void Session::apply_again(const LogEntry& entry) {
@@ -390,17 +411,31 @@ void Session::execute(SetTextile command) {
   const auto edited = command.edit(simulation_.scene().sheets[command.sheet].textile);
   if (const auto* problems = std::get_if<std::vector<Problem>>(&edited)) {
     std::unique_lock lock(mutex_);
-    refusal = refuse(Refusal::Why::kInvalid);
+    refusal = refuse(Refusal::Why::kInvalid, *problems);
     lock.unlock();
-    refusal->problems = *problems;
     return command.done(*refusal);
   }
   carry_out(command.request, command.done, TextileSet{command.sheet, std::get<Textile>(edited)});
 }
 
+void Session::execute(Act command) {
+  auto problems = simulation_.problems_of(command.actions);
+  std::optional<Refusal> refusal;
+  {
+    std::lock_guard lock(mutex_);
+    refusal = refusal_of_change();
+    if (!refusal && !problems.empty()) {
+      refusal = refuse(Refusal::Why::kInvalid, std::move(problems));
+    }
+  }
+  if (refusal) return command.done(*refusal);
+  carry_out(command.request, command.done, Acted{command.actions});
+}
+
 Outcome Session::apply(const Event& event) {
   if (const auto* run = std::get_if<RunBegun>(&event)) return apply(*run);
   if (const auto* change = std::get_if<TextileSet>(&event)) return apply(*change);
+  if (const auto* acted = std::get_if<Acted>(&event)) return apply(*acted);
   assert(std::holds_alternative<Paused>(event));
   return pause();
 }
@@ -441,12 +476,20 @@ Outcome Session::pause() {
 Outcome Session::apply(const TextileSet& change) {
   const auto step = simulation_.set_textile(change.sheet, change.textile);
   std::lock_guard lock(mutex_);
-  if (step) return Refusal{Refusal::Why::kUnstable, latest(), {}, *step, {}};
+  if (step) return Refusal{Refusal::Why::kUnstable, latest(), {}, *step, "textile"};
   textiles_[change.sheet] = change.textile;
   plan_ = std::make_shared<const Plan>(simulation_.plan());
   Applied done = applied(latest() + 1);
   done.textile = change.textile;
   return done;
+}
+
+Outcome Session::apply(const Acted& acted) {
+  const auto step = simulation_.act(acted.actions);
+  std::lock_guard lock(mutex_);
+  if (step) return Refusal{Refusal::Why::kUnstable, latest(), {}, *step, "actions"};
+  plan_ = std::make_shared<const Plan>(simulation_.plan());
+  return applied(latest() + 1);
 }
 
 // Answers steps that are over, and begins the next one; false when the log is to be written for it.
@@ -688,9 +731,10 @@ std::int64_t Session::reach_after(const Event& event) const {
     const std::int64_t ahead = latest() + ahead_;
     return run->until_frame ? std::min(ahead, std::max(*run->until_frame, goal())) : ahead;
   }
-  const bool goes_on = std::holds_alternative<TextileSet>(event)
-                           ? active()
-                           : std::holds_alternative<StepsEnded>(event) && run_.has_value();
+  const bool goes_on =
+      std::holds_alternative<TextileSet>(event) || std::holds_alternative<Acted>(event)
+          ? active()
+          : std::holds_alternative<StepsEnded>(event) && run_.has_value();
   return goes_on ? std::max(latest(), reach_.frame) : latest();
 }
 

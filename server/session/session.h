@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -87,7 +88,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   const std::string& numerics_id() const { return identity_.numerics_id; }
   std::chrono::system_clock::time_point create_time() const { return identity_.create_time; }
 
-  // As it was created; for textiles see status().
+  // As it was created; for textiles see status(). Actions do not show.
   const Scene& scene() const { return scene_; }
   SessionStatus status() const;
 
@@ -95,6 +96,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
 
   // Somebody looks: one that sleeps goes on for kAttention, also without a goal and a stream.
   void attend();
+
+  // One for a stream to act with. What is in it when a session is restored is let go.
+  int new_hand() { return ++hands_; }
 
   // Looks again whether callers have cancelled their steps.
   void wake() { scheduler_.wake(shared_from_this()); }
@@ -151,6 +155,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   void execute(RunCommand command);
   void execute(PauseCommand command);
   void execute(SetTextile command);
+  void execute(Act command);
   bool settle_steps();
   void begin_step();
   void end_step();
@@ -163,6 +168,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Outcome apply(const RunBegun& run);
   Outcome pause();
   Outcome apply(const TextileSet& change);
+  Outcome apply(const Acted& acted);
+  void let_go_of_streams();
   void compute_frame(Clock::time_point due);
   bool advance_frame();
   void count_frame(std::chrono::duration<double> time);
@@ -183,7 +190,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   bool reach_suffices();
   std::int64_t first_held_frame();
   Progress progress() const;
-  Refusal refuse(Refusal::Why why) const { return {why, latest(), {}, {}, {}}; }
+  Refusal refuse(Refusal::Why why, std::vector<Problem> problems = {}) const {
+    return {why, latest(), std::move(problems), {}, {}};
+  }
   std::optional<Refusal> refusal_of_change() const;
   bool active() const { return run_ || steps_begun() || restoring_; }
   Applied applied(std::int64_t frame) const;
@@ -203,6 +212,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Simulation simulation_;                  // touched by the slice only
   Answers<Outcome> answers_{kMaxAnswers};  // touched by the slice only
   const Scene scene_;
+  std::atomic<int> hands_ = 0;
 
   mutable std::mutex mutex_;  // guards all below
   std::deque<Command> commands_;

@@ -48,6 +48,24 @@ void set(stored::LogEntry* to, const TextileSet& from) {
   *to->mutable_textile_set()->mutable_textile() = as_given(from.textile);
 }
 
+void set(stored::LogEntry* to, const Acted& from) {
+  to->mutable_acted()->set_hand(from.actions.front().hand);
+  for (const Action& action : from.actions) {
+    if (action.kind == Action::Kind::kLetGo) continue;
+    *to->mutable_acted()->add_actions() = to_proto(action);
+  }
+}
+
+Acted acted_of(const stored::Acted& from) {
+  Acted acted;
+  for (const auto& action : from.actions()) {
+    acted.actions.push_back(trusted(to_action(action, "actions")));
+  }
+  if (acted.actions.empty()) acted.actions.push_back({.kind = Action::Kind::kLetGo});
+  for (Action& action : acted.actions) action.hand = from.hand();
+  return acted;
+}
+
 RunBegun run_of(const stored::RunBegun& from) {
   RunBegun run;
   if (from.has_time_scale()) run.time_scale = from.time_scale();
@@ -69,6 +87,8 @@ Event event_of(const stored::LogEntry& from) {
     case stored::LogEntry::kTextileSet:
       return TextileSet{static_cast<std::size_t>(from.textile_set().sheet()),
                         trusted(to_textile(from.textile_set().textile(), "textile"))};
+    case stored::LogEntry::kActed:
+      return acted_of(from.acted());
     case stored::LogEntry::EVENT_NOT_SET:
       break;
   }

@@ -73,6 +73,25 @@ TEST_F(CommandsTest, ASceneFileIsRefusedWithEveryBadFieldAndItsPlaceInTheFile) {
   EXPECT_EQ(error["violations"][0]["field"], "sheets[0].grid.rows");
 }
 
+TEST_F(CommandsTest, ACornerIsGrabbedDraggedAndReleased) {
+  ask({"session", "create", scene_file(small_scene()), "--id", "cloth"});
+  EXPECT_EQ(ask({"act", "grab", "cloth", "3,4", "--to", "-0.1,0.2,0.3", "--over", "0.1"}),
+            nlohmann::json({{"applied_frame", 1}}));
+  ask({"step", "cloth", "--frames", "7"});
+  ask({"record", "cloth", "--from", "7", "--to", "7", "-o", path("cloth.weft")});
+  ask({"export", path("cloth.weft"), "--format", "csv", "-o", path("cloth.csv")});
+  EXPECT_THAT(read_file(path("cloth.csv")),
+              HasSubstr(",-0.100000001490,0.200000002980,0.300000011921"));
+  EXPECT_EQ(weft({"act", "release", "cloth", "sheet:3,4"}).out, "applied from frame 8\n");
+  EXPECT_THAT(weft({"act", "release", "cloth", "3,4"}).err,
+              HasSubstr("actions[0].release.particle: 19 is not grabbed"));
+  EXPECT_THAT(weft({"act", "pin", "cloth", "4,4"}).err,
+              HasSubstr("row 4, column 4 is not on a sheet of 4 x 5 particles"));
+  EXPECT_THAT(weft({"act", "pin", "cloth", "4"}).err, HasSubstr("4: write ROW,COLUMN or SHEET:"));
+  EXPECT_THAT(weft({"act", "move", "cloth", "--to", "0,1,0"}).err,
+              HasSubstr("the scene has no collider"));
+}
+
 TEST_F(CommandsTest, AStepAboveTheBoundIsRefusedWithBoth) {
   v1::Scene scene = small_scene();
   scene.mutable_solver()->set_substep_s(0.01);

@@ -92,15 +92,15 @@ Response insist(const auto& stub,
 
 // One call of a random history.
 struct Call {
-  enum class Kind { kStep, kRun, kTextile } kind;
+  enum class Kind { kStep, kRun, kTextile, kDrag, kGrab } kind;
   std::int64_t frames = 0;
   double bend = 0;
 };
 
 std::vector<Call> make_history(int calls, std::mt19937& random) {
-  std::vector<Call> history;
+  std::vector<Call> history{{Call::Kind::kGrab}};
   for (int i = 0; i < calls; ++i) {
-    const auto kind = static_cast<Call::Kind>(random() % 3);
+    const auto kind = static_cast<Call::Kind>(random() % 4);
     history.push_back({kind, static_cast<std::int64_t>(1 + random() % 60),
                        1e-6 * static_cast<double>(1 + random() % 20)});
   }
@@ -111,7 +111,7 @@ std::vector<Call> make_history(int calls, std::mt19937& random) {
 std::int64_t last_frame(const std::vector<Call>& history) {
   std::int64_t frame = 0;
   for (const Call& call : history) {
-    if (call.kind != Call::Kind::kTextile) frame += call.frames;
+    if (call.kind == Call::Kind::kStep || call.kind == Call::Kind::kRun) frame += call.frames;
   }
   return frame;
 }
@@ -129,6 +129,18 @@ void carry_out(const std::vector<Call>& history, const v1::Session& session, con
       request.mutable_update_mask()->add_paths("raw.bend_n_m2");
       request.set_request_id(id);
       EXPECT_EQ(insist(stub, &Sessions::UpdateTextile, request).applied_frame(), frame + 1);
+    } else if (history[i].kind == Call::Kind::kGrab || history[i].kind == Call::Kind::kDrag) {
+      v1::ApplyActionsRequest request;
+      request.set_name(session.name());
+      request.set_request_id(id);
+      if (history[i].kind == Call::Kind::kGrab) {
+        request.add_actions()->mutable_grab()->set_particle(7);
+      } else {
+        v1::Drag* drag = request.add_actions()->mutable_drag();
+        drag->set_particle(7);
+        drag->mutable_target_m()->set_y(-1e4 * history[i].bend);
+      }
+      EXPECT_EQ(insist(stub, &Sessions::ApplyActions, request).applied_frame(), frame + 1);
     } else if (history[i].kind == Call::Kind::kRun && history[i].frames > 1) {
       v1::RunSessionRequest run;
       run.set_name(session.name());

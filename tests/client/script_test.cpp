@@ -69,6 +69,41 @@ steps:
   EXPECT_EQ(weft({"diff", path("script.weft"), path("hand.weft"), "--within", "0"}).exit, 0);
 }
 
+TEST_F(ScriptTest, GrabsDragsAndMovesWhileItRuns) {
+  v1::Scene scene = small_scene();
+  scene.add_colliders()->mutable_sphere()->set_radius_m(0.01);
+  scene_file(scene);
+  const std::string text = R"(
+variables: {x: 0.25}
+steps:
+  - create: {scene: scene.json}
+  - run: {until_frame: 2}
+  - grab: {row: 3, column: 0}
+  - drag: {row: 3, column: 0, to_m: [$x, 0, 0.1], over_s: 0.1}
+  - pin: {row: 3, column: 4}
+  - move: {to_m: [0, -1, 0]}
+  - run: {until_frame: 8}
+  - expect: {particle: {row: 3, column: 0, x_m: {near: $x, within: 1.0e-6}}}
+  - release: {row: 3, column: 0}
+  - unpin: {row: 3, column: 4}
+  - run: {until_frame: 12}
+  - expect: {particle: {row: 3, column: 0, x_m: {max: 0.249}}}
+)";
+  EXPECT_EQ(ask({"script", script(text)})["failed"], 0);
+  const std::string told = refusal(R"(steps:
+  - create: {scene: scene.json}
+  - grab: {row: 4, column: 0}
+  - drag: {row: 1, column: 0, to_m: [1, 2, 3]}
+  - move: {collider: moon, to_m: [1, 2, 3]}
+)");
+  EXPECT_THAT(told, AllOf(HasSubstr("line 3: grab"), HasSubstr("not on a sheet of 4 x 5"),
+                          HasSubstr("line 4: drag"), HasSubstr("was not grabbed before this"),
+                          HasSubstr("line 5: move"), HasSubstr("there is no collider \"moon\"")));
+  EXPECT_THAT(
+      refusal("steps:\n  - create: {scene: scene.json}\n  - drag: {row: 0, to_m: [1, 2]}\n"),
+      AllOf(HasSubstr("column is missing"), HasSubstr("drag.to_m")));
+}
+
 TEST_F(ScriptTest, EveryCombinationOfALoopIsACase) {
   const auto result = ask({"script", script(R"(
 variables: {last: 3}

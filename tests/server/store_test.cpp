@@ -85,6 +85,42 @@ TEST_F(Restart, HasEverySessionWhereItWasWithTheSameFrames) {
   }
 }
 
+TEST_F(Restart, RepeatsActionsAndLetsGoOfWhatStreamsHeld) {
+  const v1::Session session = service_->create();
+  service_->step(session, 4);
+  v1::ApplyActionsRequest request;
+  request.set_name(session.name());
+  request.add_actions()->mutable_grab()->set_particle(13);
+  v1::Drag* drag = request.add_actions()->mutable_drag();
+  drag->set_particle(13);
+  drag->mutable_target_m()->set_x(0.3);
+  drag->set_duration_s(0.2);
+  request.add_actions()->mutable_unpin()->set_particle(0);
+  ASSERT_EQ(service_->error(&Sessions::ApplyActions, request).code, grpc::StatusCode::OK);
+  service_->step(session, 5);
+  grpc::ClientContext context;
+  const auto stream = service_->sessions->Interact(&context);
+  v1::InteractRequest message;
+  message.set_session(session.name());
+  message.set_sequence(1);
+  message.mutable_action()->mutable_grab()->set_particle(7);
+  v1::InteractResponse answer;
+  ASSERT_TRUE(stream->Write(message) && stream->Read(&answer));
+  service_->step(session, 5);
+  const auto before = frames(session, 14);
+  restart();
+  expect_equal(frames(session, 14), before);
+  service_->step(session, 1);
+  request.clear_actions();
+  request.add_actions()->mutable_grab()->set_particle(13);
+  EXPECT_EQ(service_->error(&Sessions::ApplyActions, request).reason(), "FIELD_INVALID");
+  request.mutable_actions(0)->mutable_grab()->set_particle(7);
+  EXPECT_EQ(service_->error(&Sessions::ApplyActions, request).code, grpc::StatusCode::OK);
+  const auto after = frames(session, 15);
+  restart();
+  expect_equal(frames(session, 15), after);
+}
+
 TEST_F(Restart, ShowsSessionsAsTheyWere) {
   const v1::Session session = service_->create(small_scene(), "curtain");
   service_->step(session, 7);

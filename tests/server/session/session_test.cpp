@@ -25,6 +25,8 @@ Answer set_bend(Session& session, double bend) {
   return {session, command};
 }
 
+Answer act(Session& session, const Action& action) { return {session, Act{{action}, {}, {}}}; }
+
 TEST(Session, BeginsPausedAtFrame0) {
   Scheduler scheduler(2);
   const auto session = make_session(scheduler);
@@ -106,6 +108,19 @@ TEST(Session, AsleepGoesOnWithAnotherTextile) {
   const std::int64_t applied = set_bend(*session, 1e-4).applied().frame;
   while (session->status().newest->number < applied) std::this_thread::yield();
   EXPECT_GE(session->status().newest->number, applied);
+}
+
+TEST(Session, AsleepWakesWhenItIsTouched) {
+  Scheduler scheduler(1);
+  const auto session = sleeping_session(scheduler);
+  while (!is_idle(scheduler, *session)) {
+  }
+  const std::int64_t applied =
+      act(*session, {.kind = Action::Kind::kGrab, .particle = 7}).applied().frame;
+  while (session->status().newest->number < applied) std::this_thread::yield();
+  EXPECT_GT(session->status().newest->substeps, 0);
+  EXPECT_EQ(act(*session, {.kind = Action::Kind::kGrab, .particle = 7}).refused(),
+            Refusal::Why::kInvalid);
 }
 
 TEST(Session, ComputesTheFramesThatTheSolverAloneComputes) {
@@ -355,6 +370,7 @@ TEST(Session, RefusesCommandsWhenTooManyWait) {
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->refused(), Refusal::Why::kBusy);
   EXPECT_GE(accepted.size(), Session::kMaxCommands);
+  act(*session, {.kind = Action::Kind::kLetGo, .hand = session->new_hand()}).applied();
   session->close(Refusal::Why::kDeleted);
   EXPECT_EQ(accepted.front().refused(), Refusal::Why::kDeleted);
 }

@@ -1,0 +1,192 @@
+#include "core/model/handling.h"
+
+#include <algorithm>
+
+#include "core/model/text.h"
+
+namespace weft {
+namespace {
+
+using Kind = Action::Kind;
+
+const char* name_of(Kind kind) {
+  switch (kind) {
+    case Kind::kGrab:
+      return "grab";
+    case Kind::kDrag:
+      return "drag";
+    case Kind::kRelease:
+      return "release";
+    case Kind::kPin:
+      return "pin";
+    case Kind::kUnpin:
+      return "unpin";
+    case Kind::kMoveCollider:
+      return "move_collider";
+    case Kind::kLetGo:
+      break;
+  }
+  return "let_go";
+}
+
+class Handler {
+ public:
+  Handler(const Moment& moment, Handling& handling) : moment_(moment), handling_(handling) {}
+
+  void handle(const Action& action, const std::string& place) {
+    field_ = place + "." + name_of(action.kind);
+    const auto wrong = weft::find_problems(action, field_);
+    problems_.insert(problems_.end(), wrong.begin(), wrong.end());
+    if (!wrong.empty()) return;
+    if (action.kind == Kind::kLetGo) return let_go(action.hand);
+    if (action.kind == Kind::kMoveCollider) return move_collider(action);
+    const auto sheet = index_of(moment_.scene.sheets, action.name, ".sheet", "sheets");
+    if (!sheet) return;
+    const int last = moment_.scene.sheets[*sheet].particle_count() - 1;
+    if (action.particle < 0 || action.particle > last)
+      return problem(".particle", join(action.particle, " is not within 0 to ", last));
+    handle(action, *sheet);
+  }
+
+  std::vector<Problem> take() { return std::move(problems_); }
+
+ private:
+  void problem(const char* field, std::string message) {
+    problems_.push_back({field_ + field, std::move(message)});
+  }
+
+  void handle(const Action& action, std::size_t sheet) {
+    const int particle = action.particle;
+    const auto wrong = [&](const char* what) { problem(".particle", join(particle, what)); };
+    const auto grab = find_grab(sheet, particle);
+    const bool grabbed = grab != handling_.grabs.end();
+    const auto holder = find_pin(sheet, particle);
+    const bool pinned = grabbed ? grab->pinned : holder != handling_.pins[sheet].end();
+
+    if (action.kind == Kind::kGrab) {
+      if (grabbed) return wrong(" is grabbed already");
+      hold(sheet, particle);
+      return handling_.grabs.push_back({sheet, particle, action.hand, pinned});
+    }
+    if (action.kind == Kind::kPin) {
+      if (pinned) return wrong(" is pinned already");
+      if (grabbed)
+        grab->pinned = true;
+      else
+        hold(sheet, particle);
+      return;
+    }
+    if (action.kind == Kind::kUnpin) {
+      if (!pinned) return wrong(" is not pinned");
+      if (grabbed)
+        grab->pinned = false;
+      else
+        free(sheet, particle);
+      return;
+    }
+    if (!grabbed) return wrong(" is not grabbed");
+    if (action.hand != 0 && action.hand != grab->hand)
+      return wrong(" is grabbed by another stream or call");
+    if (action.kind == Kind::kRelease) return release(grab);
+    lead(action, offset_at(holder->path, moment_.time),
+         action.target - moment_.start(sheet, particle), holder->path);
+  }
+
+  // The sheet or collider of that name, or the only one.
+  template <class Named>
+  std::optional<std::size_t> index_of(const std::vector<Named>& all, const std::string& name,
+                                      const char* field, const char* what) {
+    if (name.empty() && all.size() == 1) return 0;
+    std::string names;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (all[i].name == name) return i;
+      names += (i == 0 ? "" : ", ") + all[i].name;
+    }
+    problem(field, all.empty() ? join("\"", name, "\": the scene has no ", what)
+                               : join("\"", name, "\" is none of the ", what, ": ", names));
+    return std::nullopt;
+  }
+
+  void move_collider(const Action& action) {
+    const auto index = index_of(moment_.scene.colliders, action.name, ".collider", "colliders");
+    if (!index) return;
+    Path& path = handling_.paths[*index];
+    lead(action, offset_at(path, moment_.time), action.target, path);
+  }
+
+  // A straight path, from now on.
+  void lead(const Action& action, const Vector3d& from, const Vector3d& to, Path& path) {
+    constexpr double kRounding = 1e-9;
+    const double way = (to - from).norm();
+    const double least = way / kMostSpeed;
+    const double duration =
+        action.duration.value_or(std::max(moment_.scene.solver.frame_step, least));
+    if (duration < (1 - kRounding) * least)
+      return problem(".duration_s", join(duration, " s is too short for ", way, " m: at ",
+                                         kMostSpeed, " m/s, the most, they take ", least, " s"));
+    path = {{moment_.time, from}, {moment_.time + duration, to}};
+  }
+
+  std::vector<Grab>::iterator find_grab(std::size_t sheet, int particle) {
+    auto& grabs = handling_.grabs;
+    return std::find_if(grabs.begin(), grabs.end(), [&](const Grab& grab) {
+      return grab.sheet == sheet && grab.particle == particle;
+    });
+  }
+
+  std::vector<Pin>::iterator find_pin(std::size_t sheet, int particle) {
+    auto& pins = handling_.pins[sheet];
+    return std::find_if(pins.begin(), pins.end(), [&](const Pin& pin) {
+      return std::find(pin.particles.begin(), pin.particles.end(), particle) != pin.particles.end();
+    });
+  }
+
+  // Where it is, by a pin of its own.
+  void hold(std::size_t sheet, int particle) {
+    const auto pin = find_pin(sheet, particle);
+    const Vector3d offset = pin == handling_.pins[sheet].end()
+                                ? moment_.position(sheet, particle) - moment_.start(sheet, particle)
+                                : offset_at(pin->path, moment_.time);
+    free(sheet, particle);
+    handling_.pins[sheet].push_back({{particle}, {{moment_.time, offset}}});
+  }
+
+  void free(std::size_t sheet, int particle) {
+    const auto pin = find_pin(sheet, particle);
+    if (pin == handling_.pins[sheet].end()) return;
+    std::erase(pin->particles, particle);
+    if (pin->particles.empty()) handling_.pins[sheet].erase(pin);
+  }
+
+  void release(std::vector<Grab>::iterator grab) {
+    if (grab->pinned)
+      hold(grab->sheet, grab->particle);
+    else
+      free(grab->sheet, grab->particle);
+    handling_.grabs.erase(grab);
+  }
+
+  void let_go(int hand) {
+    for (std::size_t i = handling_.grabs.size(); i-- > 0;) {
+      const auto grab = handling_.grabs.begin() + static_cast<std::ptrdiff_t>(i);
+      if (grab->hand == hand) release(grab);
+    }
+  }
+
+  const Moment& moment_;
+  Handling& handling_;
+  std::string field_;  // of the action that is being done
+  std::vector<Problem> problems_;
+};
+
+}  // namespace
+
+std::vector<Problem> handle(const Moment& moment, const std::vector<Action>& actions,
+                            Handling& handling) {
+  Handler handler(moment, handling);
+  for (std::size_t i = 0; i < actions.size(); ++i)
+    handler.handle(actions[i], join("actions[", i, "]"));
+  return handler.take();
+}
+
+}  // namespace weft

@@ -34,6 +34,24 @@ struct Repair {
   std::string reason;
 };
 
+// A simulation between two frames, as plain values: all that its later frames depend on beside the
+// scene, and what it shows of itself.
+struct Snapshot {
+  struct Sheet {
+    Textile textile;
+    double most_strain = 0;  // that the guard allows
+    Matrix3Xd x, v;          // (3 x particles) m, m/s
+    std::string solver;      // SheetSolver::save()
+  };
+  std::int64_t frame = 0;
+  std::int64_t substeps = 0;  // that the frame took
+  int frames_at_rest = 0;
+  int halvings = 0;  // of the planned step
+  Plan plan;
+  std::vector<Repair> repairs;  // all so far
+  std::vector<Sheet> sheets;
+};
+
 class SheetSolver;
 struct Dynamics;
 // Makes what moves a sheet; `dynamics` outlives it.
@@ -90,6 +108,13 @@ class Simulation {
   // planned anew. Changes nothing and returns the refusal when that step must not be run.
   // Precondition: find_problems(textile, "") is empty; index < scene().sheets.size().
   std::optional<StepRefusal> set_textile(std::size_t index, const Textile& textile);
+
+  // Precondition: advance_frame() has not returned false.
+  Snapshot snapshot() const;
+  // Goes on from there: later frames are equal to the bit to those of the simulation that the
+  // snapshot was taken of. False, and nothing changed, where it is none of this scene, whatever its
+  // textiles are.
+  [[nodiscard]] bool restore(const Snapshot& snapshot);
 
  private:
   struct State;

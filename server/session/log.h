@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -11,7 +12,7 @@
 #include "server/session/request.h"
 
 // What is kept of a session, so that it can go on in another process: its frames follow from its
-// scene and the entries of its log.
+// scene and the entries of its log. Snapshots spare the computing of the frames before them.
 namespace weft {
 
 struct StepsBegun {
@@ -42,7 +43,11 @@ struct Reach {
   std::int64_t frame = 0;
   int holders = 0;             // subscribers that the session waits for
   std::int64_t held_from = 0;  // first frame that they need, where there are any
+  // Oldest frame that can be read, where there are subscribers: they find it after a restart too.
+  std::optional<std::int64_t> history_from = {};
 };
+
+struct SessionSnapshot;
 
 // Where the log of one session is written.
 class SessionLog {
@@ -55,6 +60,11 @@ class SessionLog {
   // Adds the entry, if any, and replaces the reach. Writes follow each other in the order of calls.
   virtual void write(const std::optional<LogEntry>& entry, const Reach& reach,
                      const Written& written) = 0;
+
+  // Takes a snapshot, to be written in the background, or none: false. It is one of the last, or
+  // the last one not after `history_from`, that a restart needs.
+  using Take = std::function<std::shared_ptr<const SessionSnapshot>()>;
+  virtual bool offer(const Take& take, std::optional<std::int64_t> history_from) = 0;
 };
 
 // Keeps nothing: the session ends with the process.
@@ -63,6 +73,9 @@ class NoLog final : public SessionLog {
   void write(const std::optional<LogEntry>& /*entry*/, const Reach& /*reach*/,
              const Written& written) override {
     written({});
+  }
+  bool offer(const Take& /*take*/, std::optional<std::int64_t> /*history_from*/) override {
+    return false;
   }
 };
 

@@ -61,8 +61,8 @@ class SessionLog {
   virtual void write(const std::optional<LogEntry>& entry, const Reach& reach,
                      const Written& written) = 0;
 
-  // Takes a snapshot, to be written in the background, or none: false. It is one of the last, or
-  // the last one not after `history_from`, that a restart needs.
+  // Takes a snapshot, if there is one, to be written in the background. False where it does not. A
+  // restart begins at the last one, or at the last one not after `history_from`.
   using Take = std::function<std::shared_ptr<const SessionSnapshot>()>;
   virtual bool offer(const Take& take, std::optional<std::int64_t> history_from) = 0;
 };

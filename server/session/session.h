@@ -171,7 +171,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Outcome apply(const TextileSet& change);
   void compute_frame(Clock::time_point due);
   void offer_snapshot(std::chrono::duration<double> work);
-  SessionSnapshot snapshot() const;
+  std::shared_ptr<const SessionSnapshot> snapshot() const;
   bool begin_at(const SessionSnapshot& from, const std::vector<LogEntry>& log);
   bool advance_frame();
   void count_frame(std::chrono::duration<double> time);

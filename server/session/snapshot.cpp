@@ -22,25 +22,26 @@ void Session::offer_snapshot(std::chrono::duration<double> work) {
     std::lock_guard lock(mutex_);
     history_from = reach_.history_from;
   }
-  const auto take = [this] { return std::make_shared<const SessionSnapshot>(snapshot()); };
-  if (log_->offer(take, history_from)) work_ = {};
+  if (log_->offer([this] { return snapshot(); }, history_from)) work_ = {};
 }
 
-SessionSnapshot Session::snapshot() const {
-  SessionSnapshot made;
-  made.entries = entries_;
-  made.simulation = simulation_.snapshot();
+// nullptr where it was closed, which ends in it what is to go on after a restart.
+std::shared_ptr<const SessionSnapshot> Session::snapshot() const {
+  auto made = std::make_shared<SessionSnapshot>();
+  made->entries = entries_;
+  made->simulation = simulation_.snapshot();
   answers_.for_each([&](const Request& request, const Outcome& outcome) {
-    made.answers.push_back({request, outcome});
+    made->answers.push_back({request, outcome});
   });
   std::lock_guard lock(mutex_);
+  if (closed_) return nullptr;
   if (run_) {
-    made.under_way.push_back(
+    made->under_way.push_back(
         {latest(), {}, RunBegun{run_->time_scale, run_->until_frame, run_->until_rest}});
   }
   if (steps_begun()) {
     const Step& step = steps_.front();
-    made.under_way.push_back(
+    made->under_way.push_back(
         {*step.first - 1, step.command.request, StepsBegun{step.command.frames}});
   }
   return made;

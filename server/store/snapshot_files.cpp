@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cstdio>
 #include <cstring>
+#include <exception>
 #include <fstream>
 #include <functional>
 #include <memory>
@@ -76,10 +77,26 @@ std::string write_whole(const fs::path& path, const std::string& bytes) {
   const bool written = file &&
                        std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() &&
                        std::fflush(file.get()) == 0 && fsync(fileno(file.get())) == 0;
-  if (!written) return std::strerror(errno);
+  const std::string why = written ? "" : std::strerror(errno);
   file.reset();
+  if (!written) {
+    fs::remove(part, error);
+    return why;
+  }
   fs::rename(part, path, error);
   return error ? error.message() : "";
+}
+
+void keep(const fs::path& directory, const std::string& uid, const SessionSnapshot& snapshot,
+          std::optional<std::int64_t> history_from) try {
+  const fs::path file = file_of(directory, snapshot.simulation.frame);
+  const std::string record = records::encode(uid, snapshot);
+  const std::string error = write_whole(file, kMagic + checksum_text(uid, record) + record);
+  if (!error.empty()) spdlog::warn("{} cannot be written: {}", file.string(), error);
+  for (const std::int64_t frame : superfluous(frames_in(directory), history_from))
+    discard(file_of(directory, frame));
+} catch (const std::exception& error) {  // out of memory
+  spdlog::warn("{}: no snapshot: {}", directory.string(), error.what());
 }
 
 SessionSnapshot read_whole(const fs::path& path, const std::string& uid) {
@@ -108,16 +125,12 @@ bool SnapshotFiles::write(const std::string& uid, const SessionLog::Take& take,
     std::lock_guard lock(mutex_);
     writing_.erase(uid);
   };
-  const bool posted =
-      thread_.post([directory = directory_ / uid, uid, snapshot = take(), history_from, done] {
-        const fs::path file = file_of(directory, snapshot->simulation.frame);
-        const std::string record = records::encode(uid, *snapshot);
-        const std::string error = write_whole(file, kMagic + checksum_text(uid, record) + record);
-        if (!error.empty()) spdlog::warn("{} cannot be written: {}", file.string(), error);
-        for (const std::int64_t frame : superfluous(frames_in(directory), history_from))
-          discard(file_of(directory, frame));
-        done();
-      });
+  const auto snapshot = take();
+  const auto work = [directory = directory_ / uid, uid, snapshot, history_from, done] {
+    keep(directory, uid, *snapshot, history_from);
+    done();
+  };
+  const bool posted = snapshot && thread_.post(work);
   if (!posted) done();
   return posted;
 }

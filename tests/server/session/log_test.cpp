@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <thread>
 
 #include "tests/server/session/session_support.h"
@@ -20,6 +21,8 @@ struct Disk {
   bool slow = false;
   std::vector<std::function<void()>> waiting;  // writes that take their time
   std::vector<std::shared_ptr<const SessionSnapshot>> snapshots;
+  std::atomic<int> offers = 0;  // of snapshots
+  std::function<void()> before_snapshot;
 
   SessionPast past() {
     std::lock_guard lock(mutex);
@@ -70,10 +73,12 @@ class DiskLog : public SessionLog {
   }
 
   bool offer(const Take& take, std::optional<std::int64_t> /*history_from*/) override {
+    if (disk_->before_snapshot) disk_->before_snapshot();
     const auto snapshot = take();
     std::lock_guard lock(disk_->mutex);
-    disk_->snapshots.push_back(snapshot);
-    return true;
+    if (snapshot) disk_->snapshots.push_back(snapshot);
+    ++disk_->offers;
+    return snapshot != nullptr;
   }
 
  private:
@@ -332,6 +337,15 @@ TEST_F(SessionLogTest, ForgetsWhereReadersWereWhenTheyAreGone) {
   watcher->leave();
   while (disk_->past().reach.history_from) std::this_thread::yield();
   EXPECT_EQ(disk_->past().snapshot->simulation.frame, 30);
+}
+
+// What a drain ends goes on after a restart.
+TEST_F(SessionLogTest, HasNoSnapshotOfASessionThatIsClosed) {
+  const auto session = make_kept(disk_);
+  disk_->before_snapshot = [&] { session->close(Refusal::Why::kDraining); };
+  run(*session).applied();
+  while (disk_->offers == 0) std::this_thread::yield();
+  EXPECT_FALSE(disk_->past().snapshot);
 }
 
 TEST_F(SessionLogTest, WithASnapshotThatDoesNotFitComputesEverythingAgain) {

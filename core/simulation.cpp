@@ -136,6 +136,7 @@ struct Simulation::State {
   Course course() const;
   void go_on(const Course& course, double old_dt, const std::vector<bool>& changed);
   Plan plan_for(const std::vector<Matrix3Xd>& x) const;
+  bool take_over(const Snapshot& snapshot);
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
 };
 
@@ -561,6 +562,91 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
   state.go_on(course, dt, changed);
   state.frames_at_rest = 0;
   return std::nullopt;
+}
+
+Snapshot Simulation::snapshot() const {
+  const State& state = *state_;
+  assert(state.failure.empty());
+  Snapshot snapshot{
+      state.frame, state.substeps, state.frames_at_rest, state.halvings, state.plan, state.repairs,
+      {},          handling()};
+  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
+    const Sheet& sheet = state.sheets[s];
+    snapshot.sheets.push_back({state.scene.sheets[s].textile, sheet.most_strain, sheet.good.x,
+                               sheet.good.v, sheet.solver->save()});
+  }
+  return snapshot;
+}
+
+namespace {
+
+bool fits(const Scene& scene, const StepPlan& step, int halvings) {
+  const bool halved = halvings >= 0 && halvings <= scene.solver.max_repairs && halvings < 32 &&
+                      step.substeps % (std::int64_t{1} << halvings) == 0;
+  return halved && step.substeps >= 1 &&
+         step.substep == scene.solver.frame_step / static_cast<double>(step.substeps) &&
+         !refusal_of(step, scene.solver.allow_unstable);
+}
+
+bool fits(const SheetDefinition& definition, const Snapshot::Sheet& sheet) {
+  return sheet.x.cols() == definition.particle_count() && sheet.v.cols() == sheet.x.cols() &&
+         sheet.x.allFinite() && sheet.v.allFinite() && sheet.most_strain >= kMostStrain;
+}
+
+bool fits(const Scene& scene, const Handling& handling) {
+  return handling.pins.size() == scene.sheets.size() &&
+         handling.paths.size() == scene.colliders.size() &&
+         std::all_of(handling.grabs.begin(), handling.grabs.end(), [&](const Grab& grab) {
+           return grab.sheet < scene.sheets.size() && grab.particle >= 0 &&
+                  grab.particle < scene.sheets[grab.sheet].particle_count();
+         });
+}
+
+bool fits(const Scene& scene, const Snapshot& snapshot) {
+  if (snapshot.sheets.size() != scene.sheets.size() || snapshot.frame < 0 ||
+      snapshot.substeps < 0 || snapshot.frames_at_rest < 0 || !fits(scene, snapshot.handling))
+    return false;
+  for (std::size_t s = 0; s < scene.sheets.size(); ++s)
+    if (!fits(scene.sheets[s], snapshot.sheets[s])) return false;
+  return fits(scene, snapshot.plan.step, snapshot.halvings);
+}
+
+}  // namespace
+
+bool Simulation::restore(const Snapshot& snapshot) {
+  if (!fits(state_->scene, snapshot)) return false;
+  Scene scene = state_->scene;
+  for (std::size_t s = 0; s < scene.sheets.size(); ++s) {
+    scene.sheets[s].textile = snapshot.sheets[s].textile;
+    scene.sheets[s].pins = snapshot.handling.pins[s];
+  }
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
+    scene.colliders[c].path = snapshot.handling.paths[c];
+  if (!find_problems(scene).empty()) return false;
+  auto restored = std::make_unique<State>(std::move(scene), state_->make_solver);
+  if (!restored->take_over(snapshot)) return false;
+  state_ = std::move(restored);
+  return true;
+}
+
+// False where a solver saved something else.
+bool Simulation::State::take_over(const Snapshot& snapshot) {
+  frame = snapshot.frame;
+  frames_at_rest = snapshot.frames_at_rest;
+  substeps = snapshot.substeps;
+  halvings = snapshot.halvings;
+  plan = snapshot.plan;
+  repairs = snapshot.repairs;
+  grabs = snapshot.handling.grabs;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    Sheet& sheet = sheets[s];
+    const Snapshot::Sheet& saved = snapshot.sheets[s];
+    sheet.most_strain = saved.most_strain;
+    sheet.good = {saved.x, saved.v, kinetic_energy(sheet.mesh, saved.v)};
+    sheet.solver->start(saved.x, saved.v, time(), plan.step.substep);
+    if (!sheet.solver->load(saved.solver)) return false;
+  }
+  return true;
 }
 
 }  // namespace weft

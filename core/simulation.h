@@ -35,6 +35,25 @@ struct Repair {
   std::string reason;
 };
 
+// A simulation between two frames, as plain values: all that its later frames depend on beside the
+// scene, and what it shows of itself.
+struct Snapshot {
+  struct Sheet {
+    Textile textile;
+    double most_strain = 0;  // that the guard allows
+    Matrix3Xd x, v;          // (3 x particles) m, m/s
+    std::string solver;      // SheetSolver::save()
+  };
+  std::int64_t frame = 0;
+  std::int64_t substeps = 0;  // that the frame took
+  int frames_at_rest = 0;
+  int halvings = 0;  // of the planned step
+  Plan plan;
+  std::vector<Repair> repairs;  // all so far
+  std::vector<Sheet> sheets;
+  Handling handling;
+};
+
 class SheetSolver;
 struct Dynamics;
 // Makes what moves a sheet; `dynamics` outlives it.
@@ -100,6 +119,13 @@ class Simulation {
   // Where pins come or go the step is planned anew: then as set_textile(). Precondition:
   // problems_of(actions) is empty.
   std::optional<StepRefusal> act(const std::vector<Action>& actions);
+
+  // Precondition: advance_frame() has not returned false.
+  Snapshot snapshot() const;
+  // Goes on from there: later frames are equal to the bit to those of the simulation that the
+  // snapshot was taken of. False, and nothing changed, where it is none of this scene, whatever its
+  // textiles are.
+  [[nodiscard]] bool restore(const Snapshot& snapshot);
 
  private:
   struct State;

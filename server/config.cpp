@@ -39,6 +39,8 @@ std::vector<Number> numbers(Config& config) {
       {"max_tests", &limits.max_tests, 1, 256, "Tests of textiles at a time"},
       {"history_bytes", &limits.history_bytes_per_session, kMiB, 1024 * kMiB * 64,
        "Bytes of frames that a session keeps for its streams"},
+      {"snapshot_ms", &server.snapshot_ms, 0, 3'600'000,
+       "Milliseconds of computing that a session writes a snapshot after, which restarts begin at"},
   };
 }
 

@@ -55,6 +55,7 @@ void enable_plugins() {
 struct Server::Parts {
   explicit Parts(const ServerOptions& options)
       : backend(options.limits, options.worker_threads,
+                std::chrono::milliseconds(options.snapshot_ms),
                 options.data_dir ? open_sqlite_store(*options.data_dir) : make_no_store()) {}
 
   Backend backend;

@@ -18,6 +18,7 @@ struct ServerOptions {
   int worker_threads = static_cast<int>(std::thread::hardware_concurrency());
   std::optional<std::string> metrics;   // "127.0.0.1:9464"; absent: none
   std::optional<std::string> data_dir;  // where sessions are kept; absent: they end with the server
+  int snapshot_ms = 2000;               // SessionHost::snapshot_after
   Limits limits;
 };
 

@@ -5,6 +5,7 @@
 
 #include "core/motion/lattice_contact.h"
 #include "core/motion/lattice_law.h"
+#include "core/motion/saved_values.h"
 #include "core/motion/sheet_solver.h"
 
 namespace weft {
@@ -122,8 +123,35 @@ class LatticeSolver : public SheetSolver {
         [&](int i, Place at) { v.col(i) = displacement(at) / dt_ + a.col(i) * (dt_ / 2); });
   }
 
+  std::string save() const override {
+    SavedValues saved;
+    saved.put(kind());
+    saved.put(origin_.data(), 3);
+    saved.put(law_.measured ? 1 : 0);
+    saved.put(gap_.data(), gap_.size());
+    for (int plane = 0; plane < state_.planes(); ++plane)
+      for_each_particle([&](int, Place at) { saved.put(value(plane, at)); });
+    return saved.bytes();
+  }
+  bool load(const std::string& saved) override {
+    LoadedValues loaded(saved);
+    int saved_kind = 0, measured = 0;
+    loaded.take(&saved_kind, 1);
+    if (saved_kind != kind()) return false;
+    loaded.take(origin_.data(), 3);
+    loaded.take(&measured, 1);
+    law_.measured = measured != 0;
+    loaded.take(gap_.data(), gap_.size());
+    for (int plane = 0; plane < state_.planes(); ++plane)
+      for_each_particle([&](int, Place at) { loaded.take(&value(plane, at), 1); });
+    return loaded.all_taken();
+  }
+
  private:
   using State = SweepState<T>;
+
+  // What planes are saved.
+  int kind() const { return 16 * state_.planes() + static_cast<int>(sizeof(T)); }
 
   int bands(const Crew& crew) const { return std::min(crew.hands(), most_hands()); }
 

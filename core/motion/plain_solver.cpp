@@ -1,3 +1,4 @@
+#include "core/motion/saved_values.h"
 #include "core/motion/sheet_solver.h"
 
 namespace weft {
@@ -37,6 +38,19 @@ class PlainSolver : public SheetSolver {
   void velocities(Matrix3Xd& v) const override { integrator_->velocity(motion_, dt_, v); }
   void closing_velocities(double time, Matrix3Xd& v) override {
     integrator_->closing_velocity(dynamics_, time, dt_, motion_, v);
+  }
+
+  std::string save() const override {
+    SavedValues saved;
+    for (const Matrix3Xd* plane : {&motion_.x, &motion_.d, &motion_.d_previous})
+      saved.put(plane->data(), static_cast<std::size_t>(plane->size()));
+    return saved.bytes();
+  }
+  bool load(const std::string& saved) override {
+    LoadedValues loaded(saved);
+    for (Matrix3Xd* plane : {&motion_.x, &motion_.d, &motion_.d_previous})
+      loaded.take(plane->data(), static_cast<std::size_t>(plane->size()));
+    return loaded.all_taken();
   }
 
  private:

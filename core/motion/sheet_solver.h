@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "core/contact/contact.h"
@@ -35,6 +36,12 @@ class SheetSolver {
   // Velocities as the forces at `time` complete them, m/s: what start() needs to go on with other
   // forces or another dt without losing an order.
   virtual void closing_velocities(double time, Matrix3Xd& v) = 0;
+
+  // Everything that later steps depend on, as bytes of this machine, and back: called after
+  // start(), with the time and dt that it was saved at. False for bytes that such a solver has not
+  // saved.
+  virtual std::string save() const = 0;
+  [[nodiscard]] virtual bool load(const std::string& saved) = 0;
 };
 
 // One connection after the other, in double; any integrator, any force.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <google/protobuf/field_mask.pb.h>
+#include <google/protobuf/repeated_ptr_field.h>
 
 #include <string>
 #include <variant>
@@ -44,6 +45,11 @@ v1::Textile to_proto(const Textile& textile);
 // As it was given: a clamp that follows from the stretch stays absent.
 v1::Textile as_given(const Textile& textile);
 v1::Scene as_given(const Scene& scene);
+
+Pin to_pin(const v1::Pin& pin);
+v1::Pin to_proto(const Pin& pin);
+Path to_path(const google::protobuf::RepeatedPtrField<v1::Keyframe>& keyframes);
+google::protobuf::RepeatedPtrField<v1::Keyframe> to_proto(const Path& path);
 
 v1::Plan to_proto(const Plan& plan);
 v1::Repair to_proto(const Repair& repair);

@@ -32,12 +32,6 @@ std::string at(const std::string& field, int index) {
 // Vectors that are absent are 0 where the interface states no other default.
 Vector3d vector(const v1::Vector3& v) { return {v.x(), v.y(), v.z()}; }
 
-Path path(const RepeatedPtrField<v1::Keyframe>& keyframes) {
-  Path result;
-  for (const auto& key : keyframes) result.push_back({key.time_s(), vector(key.offset_m())});
-  return result;
-}
-
 template <class Message>
 Quaterniond rotation(const Message& message) {
   if (!message.has_rotation()) return Quaterniond::Identity();
@@ -135,7 +129,7 @@ SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
   sheet.start_velocities = {from.start_velocities_m_per_s().begin(),
                             from.start_velocities_m_per_s().end()};
   for (const auto& pin : from.pins()) {
-    sheet.pins.push_back({{pin.particles().begin(), pin.particles().end()}, path(pin.path())});
+    sheet.pins.push_back(to_pin(pin));
   }
   if (from.has_skin_m()) sheet.skin = from.skin_m();
   return sheet;
@@ -239,7 +233,7 @@ Collider Reader::collider(const v1::Collider& from, const std::string& field) {
       break;
   }
   if (from.has_friction_coefficient()) collider.friction = from.friction_coefficient();
-  collider.path = path(from.path());
+  collider.path = to_path(from.path());
   return collider;
 }
 
@@ -333,6 +327,16 @@ std::vector<Problem> mask_problems(const Textile& current, const v1::Textile& ch
 }
 
 }  // namespace
+
+Path to_path(const RepeatedPtrField<v1::Keyframe>& keyframes) {
+  Path result;
+  for (const auto& key : keyframes) result.push_back({key.time_s(), vector(key.offset_m())});
+  return result;
+}
+
+Pin to_pin(const v1::Pin& pin) {
+  return {{pin.particles().begin(), pin.particles().end()}, to_path(pin.path())};
+}
 
 Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field) {
   Reader reader;

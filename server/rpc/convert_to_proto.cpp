@@ -21,14 +21,6 @@ void set(v1::Rotation* to, const Quaterniond& from) {
   to->set_z(from.z());
 }
 
-void set(RepeatedPtrField<v1::Keyframe>* to, const Path& from) {
-  for (const auto& key : from) {
-    v1::Keyframe* added = to->Add();
-    added->set_time_s(key.time);
-    set(added->mutable_offset_m(), key.offset);
-  }
-}
-
 v1::Evaluator to_proto(Evaluator evaluator) {
   switch (evaluator) {
     case Evaluator::kSeries:
@@ -104,11 +96,7 @@ void set(v1::Sheet* to, const SheetDefinition& from, const Textile& textile,
     to->mutable_start_velocities_m_per_s()->Add(from.start_velocities.begin(),
                                                 from.start_velocities.end());
   }
-  for (const auto& pin : from.pins) {
-    v1::Pin* added = to->add_pins();
-    added->mutable_particles()->Add(pin.particles.begin(), pin.particles.end());
-    set(added->mutable_path(), pin.path);
-  }
+  for (const auto& pin : from.pins) *to->add_pins() = to_proto(pin);
   to->set_skin_m(from.skin.value_or(from.grid.spacing / 10));
 }
 
@@ -167,7 +155,7 @@ void set(v1::Scene* to, const Scene& from, const std::vector<Textile>& textiles,
     added->set_name(collider.name);
     std::visit([&](const auto& shape) { set(added, shape); }, collider.shape);
     added->set_friction_coefficient(collider.friction);
-    set(added->mutable_path(), collider.path);
+    *added->mutable_path() = to_proto(collider.path);
   }
   set(to->mutable_environment(), from.environment);
   set(to->mutable_solver(), from.solver);
@@ -263,6 +251,23 @@ v1::Repair to_proto(const Repair& repair) {
   result.set_frame(repair.frame);
   result.set_substep_s(repair.substep);
   result.set_reason(repair.reason);
+  return result;
+}
+
+RepeatedPtrField<v1::Keyframe> to_proto(const Path& path) {
+  RepeatedPtrField<v1::Keyframe> keyframes;
+  for (const auto& key : path) {
+    v1::Keyframe* added = keyframes.Add();
+    added->set_time_s(key.time);
+    set(added->mutable_offset_m(), key.offset);
+  }
+  return keyframes;
+}
+
+v1::Pin to_proto(const Pin& pin) {
+  v1::Pin result;
+  result.mutable_particles()->Add(pin.particles.begin(), pin.particles.end());
+  *result.mutable_path() = to_proto(pin.path);
   return result;
 }
 

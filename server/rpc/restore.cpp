@@ -32,6 +32,11 @@ void restore(Backend& backend, LeftSession left) {
       std::make_shared<Session>(identity, std::move(simulation), backend.host(),
                                 backend.store->log_of(identity.uid, left.past.log.size()));
   backend.registry.restore(session);
+  left.past.snapshot = backend.store->snapshot(identity.uid, left.past.reach);
+  if (left.past.snapshot && left.past.snapshot->numerics_id != numerics_id()) {
+    spdlog::warn("{} goes on from frame {}, which numerics {} computed", session_name(identity.id),
+                 left.past.snapshot->simulation.frame, left.past.snapshot->numerics_id);
+  }
   session->restore(std::move(left.past));
 }
 

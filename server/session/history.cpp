@@ -11,6 +11,11 @@ History::~History() {
   while (!frames_.empty()) drop_oldest();
 }
 
+void History::begin(std::shared_ptr<const Frame> frame) {
+  while (!frames_.empty()) drop_oldest();
+  push(std::move(frame), 0);
+}
+
 void History::push(std::shared_ptr<const Frame> frame, std::int64_t keep_from) {
   assert(frames_.empty() || frame->number == latest()->number + 1);
   frame_bytes_ += frame->bytes();

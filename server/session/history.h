@@ -18,6 +18,9 @@ class History {
   History(const History&) = delete;
   History& operator=(const History&) = delete;
 
+  // Drops all frames; the next one is this.
+  void begin(std::shared_ptr<const Frame> frame);
+
   // Adds the next frame and drops the oldest ones that no longer fit, but none from `keep_from` on.
   void push(std::shared_ptr<const Frame> frame, std::int64_t keep_from);
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -13,7 +14,7 @@
 #include "server/session/request.h"
 
 // What is kept of a session, so that it can go on in another process: its frames follow from its
-// scene and the entries of its log.
+// scene and the entries of its log. Snapshots spare the computing of the frames before them.
 namespace weft {
 
 struct StepsBegun {
@@ -47,7 +48,11 @@ struct Reach {
   std::int64_t frame = 0;
   int holders = 0;             // subscribers that the session waits for
   std::int64_t held_from = 0;  // first frame that they need, where there are any
+  // Oldest frame that can be read, where there are subscribers: they find it after a restart too.
+  std::optional<std::int64_t> history_from = {};
 };
+
+struct SessionSnapshot;
 
 // Where the log of one session is written.
 class SessionLog {
@@ -60,6 +65,11 @@ class SessionLog {
   // Adds the entry, if any, and replaces the reach. Writes follow each other in the order of calls.
   virtual void write(const std::optional<LogEntry>& entry, const Reach& reach,
                      const Written& written) = 0;
+
+  // Takes a snapshot, if there is one, to be written in the background. False where it does not. A
+  // restart begins at the last one, or at the last one not after `history_from`.
+  using Take = std::function<std::shared_ptr<const SessionSnapshot>()>;
+  virtual bool offer(const Take& take, std::optional<std::int64_t> history_from) = 0;
 };
 
 // Keeps nothing: the session ends with the process.
@@ -68,6 +78,9 @@ class NoLog final : public SessionLog {
   void write(const std::optional<LogEntry>& /*entry*/, const Reach& /*reach*/,
              const Written& written) override {
     written({});
+  }
+  bool offer(const Take& /*take*/, std::optional<std::int64_t> /*history_from*/) override {
+    return false;
   }
 };
 

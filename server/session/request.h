@@ -41,6 +41,15 @@ class Answers {
     order_.pop_front();
   }
 
+  // Calls `f` with each request and its answer, oldest first.
+  template <class F>
+  void for_each(const F& f) const {
+    for (const std::string& id : order_) {
+      const Known& known = known_.at(id);
+      f(Request{id, known.checksum}, known.answer);
+    }
+  }
+
  private:
   std::size_t most_;
   std::map<std::string, Known> known_;

@@ -51,6 +51,7 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
       notify_(host.notify),
       simulation_(std::move(simulation)),
       scene_(simulation_.scene()),
+      snapshot_after_(host.snapshot_after),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),
       history_(host.history_bytes) {
@@ -58,14 +59,16 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
 }
 
 void Session::restore(SessionPast past) {
+  if (past.snapshot) begin_at(*past.snapshot, past.log);
   {
     std::lock_guard lock(mutex_);
     reach_ = past.reach;
     if (past.log.empty()) return;
     set_state(SessionState::kRestoring);
-    restoring_ = Restoring{
-        {std::make_move_iterator(past.log.begin()), std::make_move_iterator(past.log.end())},
-        past.reach.frame};
+    restoring_ = Restoring{{std::make_move_iterator(past.log.begin() + entries_),
+                            std::make_move_iterator(past.log.end())},
+                           past.reach.frame};
+    if (past.reach.history_from) readers_until_ = Clock::now() + kHoldAfterRestore;
     if (past.reach.holders > 0) {
       past_holders_ =
           PastHolders{past.reach.holders, past.reach.held_from, Clock::now() + kHoldAfterRestore};
@@ -162,6 +165,7 @@ bool Session::settle_writing() {
     then = std::exchange(writing_.then, nullptr);
     error = *std::exchange(writing_.written, std::nullopt);
   }
+  if (error.empty()) ++entries_;
   then(error);
   return true;
 }
@@ -215,6 +219,7 @@ void Session::let_go_of_streams() {
 }
 
 void Session::apply_again(const LogEntry& entry) {
+  ++entries_;
   const Done nobody = [](const Outcome&) {};
   if (const auto* begun = std::get_if<StepsBegun>(&entry.event)) {
     StepCommand command;
@@ -343,14 +348,17 @@ void Session::write_reach() {
   Reach reach;
   {
     std::lock_guard lock(mutex_);
-    if (writing_.reach || writing_.then || closed_ || restoring_ || !active()) return;
+    if (writing_.reach || writing_.then || closed_ || restoring_) return;
     const std::int64_t wanted = std::min(latest() + ahead_ / 2, goal());
-    if (reach_.frame >= wanted && reach_suffices()) return;
+    const bool suffices = !active() || (reach_.frame >= wanted && reach_suffices());
+    if (suffices && has_readers() == reach_.history_from.has_value()) return;
     constexpr std::int64_t kLeast = 8, kMost = 4096;
     const auto now = Clock::now();
-    if (now - reach_time_ < std::chrono::milliseconds(500)) ahead_ = std::min(2 * ahead_, kMost);
-    if (now - reach_time_ > std::chrono::seconds(2)) ahead_ = std::max(ahead_ / 2, kLeast);
-    reach_time_ = now;
+    if (!suffices) {
+      if (now - reach_time_ < std::chrono::milliseconds(500)) ahead_ = std::min(2 * ahead_, kMost);
+      if (now - reach_time_ > std::chrono::seconds(2)) ahead_ = std::max(ahead_ / 2, kLeast);
+      reach_time_ = now;
+    }
     reach = reach_to(std::min(latest() + ahead_, goal()));
     writing_.reach = true;
   }
@@ -603,6 +611,7 @@ void Session::compute_frame(Clock::time_point due) {
     }
   }
   offer_to_all();
+  offer_snapshot(Clock::now() - begin);
 }
 
 void Session::count_frame(std::chrono::duration<double> time) {
@@ -719,7 +728,13 @@ Reach Session::reach_to(std::int64_t frame) {
     if (subscription->policy_ == SlowReader::kHoldSession) ++reach.holders;
   }
   if (reach.holders == 0) reach.held_from = 0;
+  if (has_readers()) reach.history_from = history_.oldest();
   return reach;
+}
+
+// Whether there are subscribers, or some that may come back.
+bool Session::has_readers() const {
+  return !subscriptions_.empty() || past_holders_ || Clock::now() < readers_until_;
 }
 
 // How far frames may be published once the event is in the log.

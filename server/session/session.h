@@ -17,6 +17,7 @@
 #include "server/session/history.h"
 #include "server/session/log.h"
 #include "server/session/scheduler.h"
+#include "server/session/snapshot.h"
 #include "server/session/stats.h"
 #include "server/session/subscription.h"
 
@@ -48,7 +49,9 @@ struct SessionStatus {
 struct SessionPast {
   std::vector<LogEntry> log;
   Reach reach;
+  std::optional<SessionSnapshot> snapshot = {};  // not after reach.history_from
 };
+
 // Hears what an operator should know: repairs and failures, a line each. Called from any thread,
 // with no lock held. Must not block.
 using Notify = std::function<void(const std::string& line)>;
@@ -59,6 +62,8 @@ struct SessionHost {
   Stats& stats;
   std::size_t history_bytes;  // at least two frames are kept, more as long as they fit
   Notify notify = {};
+  // Computing between two snapshots; a session of more than 20 000 particles has them more rarely.
+  std::chrono::duration<double> snapshot_after{2};
 };
 
 // A simulation that advances on a scheduler. Calls reach it as commands that are carried out
@@ -72,15 +77,16 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   static constexpr std::size_t kMaxAnswers = 1000;
   // How long a session that sleeps without a goal and a stream goes on after somebody looked.
   static constexpr std::chrono::seconds kAttention{2};
-  // How long a session that was restored waits for subscribers that it had held frames for.
+  // How long a session that was restored waits for subscribers that it had held frames for, and may
+  // be restored again with the frames that subscribers had.
   static constexpr std::chrono::seconds kHoldAfterRestore{30};
 
   // PAUSED at frame 0. Precondition: the simulation has no refusal.
   Session(SessionIdentity identity, Simulation simulation, const SessionHost& host,
           std::unique_ptr<SessionLog> log);
 
-  // Computes again what there was before any command is carried out, then goes on as it was. Called
-  // at most once, first.
+  // Computes again what there was since the snapshot before any command is carried out, then goes
+  // on as it was. Called at most once, first.
   void restore(SessionPast past);
 
   const std::string& id() const { return identity_.id; }
@@ -171,6 +177,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Outcome apply(const Acted& acted);
   void let_go_of_streams();
   void compute_frame(Clock::time_point due);
+  void offer_snapshot(std::chrono::duration<double> work);
+  std::shared_ptr<const SessionSnapshot> snapshot() const;
+  bool begin_at(const SessionSnapshot& from, const std::vector<LogEntry>& log);
   bool advance_frame();
   void count_frame(std::chrono::duration<double> time);
   std::vector<Repair> take_repairs();
@@ -188,6 +197,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Reach reach_to(std::int64_t frame);
   std::int64_t reach_after(const Event& event) const;
   bool reach_suffices();
+  bool has_readers() const;
   std::int64_t first_held_frame();
   Progress progress() const;
   Refusal refuse(Refusal::Why why, std::vector<Problem> problems = {}) const {
@@ -211,8 +221,11 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   const Notify notify_;
   Simulation simulation_;                  // touched by the slice only
   Answers<Outcome> answers_{kMaxAnswers};  // touched by the slice only
+  std::int64_t entries_ = 0;               // of the log, carried out; touched by the slice only
   const Scene scene_;
   std::atomic<int> hands_ = 0;
+  const std::chrono::duration<double> snapshot_after_;
+  std::chrono::duration<double> work_{};  // since the last snapshot; touched by the slice only
 
   mutable std::mutex mutex_;  // guards all below
   std::deque<Command> commands_;
@@ -236,6 +249,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Clock::time_point reach_time_;  // when it was
   std::optional<Restoring> restoring_;
   std::optional<PastHolders> past_holders_;
+  Clock::time_point readers_until_;  // those of the past may come back until then
 };
 
 }  // namespace weft

@@ -33,9 +33,9 @@ std::unique_ptr<Subscription> Session::subscribe(std::weak_ptr<FrameSink> sink,
   subscriptions_.push_back(subscription.get());
   if (policy == SlowReader::kHoldSession && past_holders_ && --past_holders_->count == 0)
     past_holders_.reset();
-  const bool released = release();
+  release();
   lock.unlock();
-  if (released) wake();
+  wake();
   return subscription;
 }
 
@@ -44,7 +44,7 @@ void Session::unsubscribe(const Subscription& subscription) {
     std::lock_guard lock(mutex_);
     std::erase(subscriptions_, &subscription);
     attended_ = Clock::now();
-    if (!release()) return;
+    release();
   }
   wake();
 }

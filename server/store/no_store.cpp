@@ -7,6 +7,10 @@ class NoStore final : public SessionStore {
  public:
   LeftBehind load() override { return {}; }
   void add(const KeptSession& /*session*/, const Request& /*creation*/) override {}
+  std::optional<SessionSnapshot> snapshot(const std::string& /*uid*/,
+                                          const Reach& /*reach*/) override {
+    return std::nullopt;
+  }
   std::unique_ptr<SessionLog> log_of(const std::string& /*uid*/, std::size_t /*entries*/) override {
     return std::make_unique<NoLog>();
   }

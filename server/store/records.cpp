@@ -1,6 +1,7 @@
 #include "server/store/records.h"
 
 #include <google/protobuf/util/time_util.h>
+#include <zlib.h>
 
 #include "server/rpc/convert.h"
 #include "weft/storage/v1/storage.pb.h"
@@ -115,6 +116,7 @@ std::string encode(const Progress& progress) {
   to.set_frame(progress.reach.frame);
   to.set_holders(progress.reach.holders);
   to.set_held_from(progress.reach.held_from);
+  if (progress.reach.history_from) to.set_history_from(*progress.reach.history_from);
   return to.SerializeAsString();
 }
 
@@ -138,12 +140,22 @@ KeptSession decode_session(const std::string& bytes) {
 
 Progress decode_progress(const std::string& bytes) {
   const auto from = parse<stored::KeptProgress>(bytes);
-  return {from.entries(), {from.frame(), from.holders(), from.held_from()}};
+  Progress progress{from.entries(), {from.frame(), from.holders(), from.held_from()}};
+  if (from.has_history_from()) progress.reach.history_from = from.history_from();
+  return progress;
 }
 
 LogEntry decode_entry(const std::string& bytes) {
   const auto from = parse<stored::LogEntry>(bytes);
   return {from.frame(), {from.request_id(), from.request_checksum()}, event_of(from)};
+}
+
+std::uint32_t checksum(const std::string& key, const std::string& record) {
+  const auto bytes = [](const std::string& text) {
+    return reinterpret_cast<const Bytef*>(text.data());
+  };
+  return static_cast<std::uint32_t>(
+      crc32_z(crc32_z(0, bytes(key), key.size()), bytes(record), record.size()));
 }
 
 }  // namespace weft::records

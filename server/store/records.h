@@ -17,9 +17,14 @@ struct Progress {
 std::string encode(const KeptSession& session);
 std::string encode(const Progress& progress);
 std::string encode(const LogEntry& entry);
+std::string encode(const std::string& uid, const SessionSnapshot& snapshot);
 
 KeptSession decode_session(const std::string& bytes);
 Progress decode_progress(const std::string& bytes);
 LogEntry decode_entry(const std::string& bytes);
+SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes);
+
+// CRC-32 of the record and what it is filed under.
+std::uint32_t checksum(const std::string& key, const std::string& record);
 
 }  // namespace weft::records

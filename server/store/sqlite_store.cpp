@@ -3,17 +3,18 @@
 #include <SQLiteCpp/Transaction.h>
 #include <spdlog/spdlog.h>
 #include <sqlite3.h>
-#include <zlib.h>
 
 #include <condition_variable>
 #include <deque>
 #include <filesystem>
 #include <future>
 #include <mutex>
+#include <set>
 #include <thread>
 #include <utility>
 
 #include "server/store/records.h"
+#include "server/store/snapshot_files.h"
 
 namespace weft {
 namespace {
@@ -44,13 +45,7 @@ constexpr const char* kTables = R"(
     uid TEXT NOT NULL);
 )";
 
-std::int64_t checksum(const std::string& key, const std::string& record) {
-  const auto bytes = [](const std::string& text) {
-    return reinterpret_cast<const Bytef*>(text.data());
-  };
-  return static_cast<std::int64_t>(
-      crc32_z(crc32_z(0, bytes(key), key.size()), bytes(record), record.size()));
-}
+using records::checksum;
 
 std::string entry_key(const std::string& uid, std::int64_t number) {
   return uid + "/" + std::to_string(number);
@@ -106,6 +101,9 @@ class SqliteStore final : public SessionStore {
   }
 
   LeftBehind load() override;
+  std::optional<SessionSnapshot> snapshot(const std::string& uid, const Reach& reach) override {
+    return snapshots_.read(uid, reach.history_from);
+  }
   void add(const KeptSession& session, const Request& creation) override;
   std::unique_ptr<SessionLog> log_of(const std::string& uid, std::size_t entries) override;
   void erase(const std::string& uid, const Request& deletion,
@@ -128,6 +126,7 @@ class SqliteStore final : public SessionStore {
   std::string commit(const std::deque<Job>& jobs);
 
   const std::string path_;
+  SnapshotFiles snapshots_{std::filesystem::path(path_).replace_filename("snapshots")};
   SQLite::Database database_;  // used by load(), then by the thread alone
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -170,6 +169,7 @@ LeftBehind SqliteStore::load() try {
                               static_cast<std::uint32_t>(request.getColumn(1).getInt64())},
                              request.getColumn(2).getString()});
   }
+  std::set<std::string> uids;
   SQLite::Statement row(database_, "SELECT uid, id, record, checksum FROM session ORDER BY id");
   while (row.executeStep()) {
     const std::string uid = row.getColumn(0).getString();
@@ -188,7 +188,9 @@ LeftBehind SqliteStore::load() try {
     } catch (const SQLite::Exception& error) {
       left.damaged.push_back({id, uid, error.what()});
     }
+    uids.insert(uid);
   }
+  snapshots_.keep_only(uids);
   return left;
 } catch (const SQLite::Exception& error) {
   throw StoreError(text_of(path_, error));
@@ -262,7 +264,10 @@ void SqliteStore::erase(const std::string& uid, const Request& deletion,
         }
         keep_request(database, deletion, uid);
       },
-      written);
+      [this, uid, written](const std::string& error) {
+        if (error.empty()) snapshots_.erase(uid);
+        written(error);
+      });
 }
 
 void SqliteStore::keep_request(SQLite::Database& database, const Request& request,
@@ -298,6 +303,10 @@ class SqliteStore::Log final : public SessionLog {
           if (error.empty() && added) ++*entries;
           written(error);
         });
+  }
+
+  bool offer(const Take& take, std::optional<std::int64_t> history_from) override {
+    return store_.snapshots_.write(uid_, take, history_from);
   }
 
  private:

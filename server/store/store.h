@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -56,6 +57,10 @@ class SessionStore {
 
   // Keeps a new session, made by `creation`, and waits until it is safe. Throws StoreError.
   virtual void add(const KeptSession& session, const Request& creation) = 0;
+
+  // The newest sound snapshot of a session at most at the frame of its reach's history, if there is
+  // one. What is newer is removed.
+  virtual std::optional<SessionSnapshot> snapshot(const std::string& uid, const Reach& reach) = 0;
 
   // Where the session's log goes on after so many entries. The store outlives it.
   virtual std::unique_ptr<SessionLog> log_of(const std::string& uid, std::size_t entries) = 0;

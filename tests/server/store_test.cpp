@@ -1,11 +1,14 @@
+#include <spdlog/spdlog.h>
 #include <stdlib.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <thread>
 
+#include "server/store/snapshot_files.h"
 #include "tests/support/service/service.h"
 
 namespace weft::testing {
@@ -31,6 +34,7 @@ class Restart : public ::testing::Test {
   void start() {
     ServerOptions options = Service::in_process();
     options.data_dir = directory_;
+    options.snapshot_ms = snapshot_ms_;
     service_ = std::make_unique<Service>(options);
   }
   void restart() {
@@ -59,7 +63,15 @@ class Restart : public ::testing::Test {
 
   std::string file() const { return directory_ + "/sessions.db"; }
 
+  // Frames that this server has computed, restored ones among them.
+  std::int64_t computed() {
+    grpc::ClientContext context;
+    v1::ServerStats stats;
+    EXPECT_TRUE(service_->servers->GetServerStats(&context, {}, &stats).ok());
+    return stats.frames();
+  }
   std::string directory_;
+  int snapshot_ms_ = 2000;
   std::unique_ptr<Service> service_;
 };
 
@@ -300,6 +312,138 @@ TEST_F(Restart, NeverMistakesDamageForASession) {
     service_.reset();
   }
   EXPECT_GT(found, 0);
+}
+
+// A server that keeps a snapshot of every frame, as far as it comes to it.
+class RestartWithSnapshots : public Restart {
+ protected:
+  RestartWithSnapshots() {
+    snapshot_ms_ = 0;
+    restart();
+  }
+
+  std::filesystem::path snapshots_of(const v1::Session& session) const {
+    return std::filesystem::path(directory_) / "snapshots" / session.uid();
+  }
+  // Steps until there is a snapshot of the newest frame. One is left out while the one before it is
+  // written.
+  std::int64_t kept(const v1::Session& session) {
+    for (;;) {
+      const std::int64_t frame = service_->step(session).frame();
+      for (int look = 0; look < 1000; ++look) {
+        if (std::filesystem::exists(snapshots_of(session) / std::to_string(frame))) return frame;
+        std::this_thread::yield();
+      }
+    }
+  }
+};
+
+TEST_F(RestartWithSnapshots, ComputesOnlyWhatCameAfterTheLast) {
+  const v1::Session session = service_->create();
+  service_->step(session, 300);
+  const std::int64_t last = kept(session);
+  set_preset(session, "denim_11oz");
+  const v1::Session before = service_->get(session);
+  restart();
+  service_->pause(session);
+  EXPECT_EQ(computed(), 0);
+  EXPECT_EQ(service_->get(session).SerializeAsString(), before.SerializeAsString());
+  service_->step(session, 5);
+  const auto found = Stream(*service_, frames_of(session, last, last + 5)).rest();
+
+  const v1::Session undisturbed = service_->create();
+  service_->step(undisturbed, last);
+  set_preset(undisturbed, "denim_11oz");
+  service_->step(undisturbed, 5);
+  const auto wanted = Stream(*service_, frames_of(undisturbed, last, last + 5)).rest();
+  expect_equal(found, wanted);
+}
+
+TEST_F(RestartWithSnapshots, KeepsTwoOfThemAndNoneOfASessionThatIsGone) {
+  const v1::Session session = service_->create(), other = service_->create();
+  for (int i = 0; i < 5; ++i) kept(session);
+  kept(other);
+  const auto count = [&] {
+    return std::distance(std::filesystem::directory_iterator(snapshots_of(session)), {});
+  };
+  while (count() != 2) std::this_thread::yield();
+  service_->erase(other);
+  while (std::filesystem::exists(snapshots_of(other))) std::this_thread::yield();
+}
+
+// Whatever byte is changed, wherever the file ends: the one before it serves.
+TEST_F(RestartWithSnapshots, NeverMistakesADamagedOneForASound) {
+  const v1::Session session = service_->create();
+  kept(session);
+  const std::int64_t newest = kept(session);
+  const std::string before = service_->get(session).SerializeAsString();
+  service_.reset();
+  std::int64_t older = newest;
+  for (const auto& file : std::filesystem::directory_iterator(snapshots_of(session)))
+    older = std::min<std::int64_t>(older, std::stoll(file.path().filename().string()));
+  ASSERT_LT(older, newest);
+  const auto path = [&](std::int64_t frame) {
+    return snapshots_of(session) / std::to_string(frame);
+  };
+  const std::string good = content(path(newest));
+  spdlog::set_level(spdlog::level::off);
+  const SnapshotFiles files(directory_ + "/snapshots");
+  const auto frame_with = [&](const std::string& bytes) {
+    std::ofstream(path(newest), std::ios::binary) << bytes;
+    return files.read(session.uid(), std::nullopt)->simulation.frame;
+  };
+  EXPECT_EQ(frame_with(good), newest);
+  for (std::size_t place = 0; place < good.size(); place += 3) {
+    std::string bytes = good;
+    bytes[place] = static_cast<char>(bytes[place] ^ 0x11);
+    ASSERT_EQ(frame_with(bytes), older) << "byte " << place;
+  }
+  for (std::size_t size = 0; size < good.size(); size += 7)
+    ASSERT_EQ(frame_with(good.substr(0, size)), older) << size << " bytes";
+  spdlog::set_level(spdlog::level::info);
+
+  std::ofstream(path(newest), std::ios::binary) << good.substr(0, 100);
+  start();
+  service_->pause(session);
+  EXPECT_EQ(computed(), newest - older);
+  EXPECT_EQ(service_->get(session).SerializeAsString(), before);
+  service_.reset();
+  for (const auto& file : std::filesystem::directory_iterator(snapshots_of(session)))
+    std::ofstream(file.path(), std::ios::binary) << "damaged";
+  start();
+  service_->pause(session);
+  EXPECT_EQ(computed(), newest);
+  EXPECT_EQ(service_->get(session).SerializeAsString(), before);
+}
+
+TEST_F(RestartWithSnapshots, GoesOnWhereTheyCannotBeWritten) {
+  service_.reset();
+  std::filesystem::remove_all(directory_ + "/snapshots");
+  std::ofstream(directory_ + "/snapshots") << "no directory";
+  start();
+  const v1::Session session = service_->create();
+  service_->step(session, 30);
+  const std::string before = service_->get(session).SerializeAsString();
+  restart();
+  service_->pause(session);
+  EXPECT_EQ(service_->get(session).SerializeAsString(), before);
+}
+
+TEST(Snapshots, AreKeptWhereARestartNeedsThem) {
+  std::vector<std::int64_t> kept;
+  for (std::int64_t frame = 10; frame <= 1000; frame += 10) {
+    kept.push_back(frame);
+    const std::int64_t oldest = std::max<std::int64_t>(0, frame - 300);
+    for (const std::int64_t gone : superfluous(kept, oldest)) std::erase(kept, gone);
+    EXPECT_LE(kept.size(), SnapshotFiles::kMost);
+    EXPECT_EQ(kept.back(), frame);
+    if (frame == 10) continue;
+    EXPECT_EQ(kept[kept.size() - 2], frame - 10);
+    EXPECT_LE(kept.front(), std::max<std::int64_t>(oldest, 10));
+    EXPECT_GE(kept.front(), oldest - 200);
+  }
+  for (const std::int64_t gone : superfluous(kept, std::nullopt)) std::erase(kept, gone);
+  EXPECT_EQ(kept, (std::vector<std::int64_t>{990, 1000}));
 }
 
 }  // namespace

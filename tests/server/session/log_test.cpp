@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <thread>
 
 #include "tests/server/session/session_support.h"
@@ -19,10 +20,18 @@ struct Disk {
   std::string error;  // of every write
   bool slow = false;
   std::vector<std::function<void()>> waiting;  // writes that take their time
+  std::vector<std::shared_ptr<const SessionSnapshot>> snapshots;
+  std::atomic<int> offers = 0;  // of snapshots
+  std::function<void()> before_snapshot;
 
   SessionPast past() {
     std::lock_guard lock(mutex);
-    return {entries, reach};
+    SessionPast past{entries, reach};
+    for (const auto& snapshot : snapshots) {
+      if (!reach.history_from || snapshot->simulation.frame <= *reach.history_from)
+        past.snapshot = *snapshot;
+    }
+    return past;
   }
   void fail(const std::string& why) {
     std::lock_guard lock(mutex);
@@ -63,6 +72,15 @@ class DiskLog : public SessionLog {
     written(error);
   }
 
+  bool offer(const Take& take, std::optional<std::int64_t> /*history_from*/) override {
+    if (disk_->before_snapshot) disk_->before_snapshot();
+    const auto snapshot = take();
+    std::lock_guard lock(disk_->mutex);
+    if (snapshot) disk_->snapshots.push_back(snapshot);
+    ++disk_->offers;
+    return snapshot != nullptr;
+  }
+
  private:
   std::shared_ptr<Disk> disk_;
 };
@@ -74,10 +92,23 @@ class SessionLogTest : public ::testing::Test {
                                      SessionHost{scheduler_, stats(), kMuchHistory},
                                      std::make_unique<DiskLog>(disk));
   }
+  // One that takes a snapshot of every frame.
+  std::shared_ptr<Session> make_kept(const std::shared_ptr<Disk>& disk,
+                                     std::size_t history_bytes = kMuchHistory) {
+    SessionHost host{scheduler_, stats(), history_bytes};
+    host.snapshot_after = {};
+    return std::make_shared<Session>(make_identity("test", "test"), Simulation(hung_scene()), host,
+                                     std::make_unique<DiskLog>(disk));
+  }
   // The session that another process would have.
   std::shared_ptr<Session> restored(const SessionPast& past) {
     const auto session = make(std::make_shared<Disk>());
     session->restore(past);
+    return session;
+  }
+  std::shared_ptr<Session> restored_and_paused(const SessionPast& past) {
+    const auto session = restored(past);
+    pause(*session).applied();
     return session;
   }
 
@@ -156,8 +187,7 @@ TEST_F(SessionLogTest, GivesTheSameFramesAgain) {
   watcher->wait_for_frame(30);
   Answer(*session, bend(4e-5)).applied();
   watcher->wait_for_frame(60);
-  const auto again = restored(disk_->past());
-  pause(*again).applied();
+  const auto again = restored_and_paused(disk_->past());
   const auto frame = session->status().newest, same = again->status().newest;
   ASSERT_EQ(same->number, frame->number);
   EXPECT_EQ(same->positions, frame->positions);
@@ -209,6 +239,128 @@ TEST_F(SessionLogTest, EndsAStepWhoseCallerWentAway) {
   ASSERT_THAT(disk_->past().log, SizeIs(2));
   const auto again = restored(disk_->past());
   EXPECT_EQ(step(*again, 1).applied().frame, newest + 1);
+}
+
+// Frames that were computed while it did something.
+template <class F>
+std::int64_t computed_by(const F& something) {
+  const std::int64_t before = stats().frames;
+  something();
+  return stats().frames - before;
+}
+
+void expect_equal(const Session& found, const Session& wanted) {
+  const SessionStatus a = found.status(), b = wanted.status();
+  ASSERT_EQ(a.newest->number, b.newest->number);
+  EXPECT_EQ(a.newest->positions, b.newest->positions);
+  EXPECT_EQ(a.newest->velocities, b.newest->velocities);
+  EXPECT_EQ(a.newest->time, b.newest->time);
+  EXPECT_EQ(a.newest->stats.potential_energy, b.newest->stats.potential_energy);
+  EXPECT_EQ(a.newest->substeps, b.newest->substeps);
+  EXPECT_EQ(a.textiles, b.textiles);
+  EXPECT_EQ(a.plan->step.estimated_bound, b.plan->step.estimated_bound);
+}
+
+TEST_F(SessionLogTest, WithASnapshotComputesOnlyWhatCameAfterIt) {
+  const auto session = make_kept(disk_);
+  step(*session, 200).applied();
+  Answer(*session, bend(3e-5)).applied();
+  step(*session, 100).applied();
+  Answer(*session, bend(4e-5)).applied();
+  const SessionPast past = disk_->past();
+  ASSERT_TRUE(past.snapshot);
+  std::shared_ptr<Session> again;
+  EXPECT_EQ(computed_by([&] { again = restored_and_paused(past); }), 0);
+  for (int i = 0; i < 20; ++i) {
+    expect_equal(*again, *session);
+    step(*again, 1).applied();
+    step(*session, 1).applied();
+  }
+}
+
+// Whenever it was taken: in a step, in a run, before a change, after a pause.
+TEST_F(SessionLogTest, GivesTheSameFramesAndAnswersFromEverySnapshot) {
+  const auto session = make_kept(disk_);
+  const Applied stepped = Answer(*session, named_step(10, "step")).applied();
+  SetTextile change = bend(3e-5);
+  change.request = {"change", 7};
+  const Applied changed = Answer(*session, change).applied();
+  const auto watcher = Watcher::of(*session, 0);
+  run(*session, 1'000'000).applied();
+  watcher->wait_for_frame(20);
+  pause(*session).applied();
+  RunCommand to_goal;
+  to_goal.until_frame = session->status().newest->number + 10;
+  to_goal.request = {"run", 8};
+  const Applied ran = Answer(*session, to_goal).applied();
+  watcher->wait_for_frame(*to_goal.until_frame);
+  pause(*session).applied();
+  const auto frames = session->status().newest->number;
+  SessionPast past = disk_->past();
+  ASSERT_EQ(static_cast<std::int64_t>(disk_->snapshots.size()), frames);
+  for (const auto& snapshot : disk_->snapshots) {
+    SCOPED_TRACE(snapshot->simulation.frame);
+    past.snapshot = *snapshot;
+    std::shared_ptr<Session> again;
+    EXPECT_EQ(computed_by([&] { again = restored_and_paused(past); }),
+              frames - snapshot->simulation.frame);
+    expect_equal(*again, *session);
+    EXPECT_EQ(Answer(*again, named_step(10, "step")).applied().time, stepped.time);
+    const Applied same = Answer(*again, change).applied();
+    EXPECT_EQ(same.frame, changed.frame);
+    EXPECT_EQ(same.textile, changed.textile);
+    EXPECT_EQ(same.plan->step.estimated_bound, changed.plan->step.estimated_bound);
+    EXPECT_EQ(Answer(*again, to_goal).applied().frame, ran.frame);
+  }
+}
+
+TEST_F(SessionLogTest, WithASnapshotGivesReadersTheFramesThatTheyHad) {
+  const auto session = make_kept(disk_, history_of(20));
+  const auto watcher = Watcher::of(*session, 0);
+  run(*session, 300).applied();
+  watcher->wait_for_frame(300);
+  pause(*session).applied();
+  const std::int64_t oldest = watcher->subscription().progress().oldest_frame;
+  ASSERT_GT(oldest, 200);
+  const auto again = restored(disk_->past());
+  const auto reader = Watcher::of(*again, oldest);
+  for (std::int64_t frame = oldest; frame <= 300; ++frame) {
+    ASSERT_EQ(reader->read().frame->number, frame);
+  }
+}
+
+TEST_F(SessionLogTest, ForgetsWhereReadersWereWhenTheyAreGone) {
+  const auto session = make_kept(disk_);
+  auto watcher = Watcher::of(*session, 0);
+  step(*session, 30).applied();
+  EXPECT_EQ(disk_->past().reach.history_from, 0);
+  watcher->leave();
+  while (disk_->past().reach.history_from) std::this_thread::yield();
+  EXPECT_EQ(disk_->past().snapshot->simulation.frame, 30);
+}
+
+// What a drain ends goes on after a restart.
+TEST_F(SessionLogTest, HasNoSnapshotOfASessionThatIsClosed) {
+  const auto session = make_kept(disk_);
+  disk_->before_snapshot = [&] { session->close(Refusal::Why::kDraining); };
+  run(*session).applied();
+  while (disk_->offers == 0) std::this_thread::yield();
+  EXPECT_FALSE(disk_->past().snapshot);
+}
+
+TEST_F(SessionLogTest, WithASnapshotThatDoesNotFitComputesEverythingAgain) {
+  const auto session = make_kept(disk_);
+  step(*session, 30).applied();
+  SessionPast past = disk_->past();
+  for (const int fault : {0, 1, 2}) {
+    SessionPast wrong = past;
+    if (fault == 0) wrong.snapshot->simulation.sheets[0].solver.pop_back();
+    if (fault == 1) wrong.snapshot->entries = 5;
+    if (fault == 2) wrong.snapshot->entries = 0;
+    std::shared_ptr<Session> again;
+    EXPECT_EQ(computed_by([&] { again = restored_and_paused(wrong); }), 30);
+    expect_equal(*again, *session);
+  }
 }
 
 }  // namespace

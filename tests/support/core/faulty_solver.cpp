@@ -37,6 +37,8 @@ class FaultySolver : public SheetSolver {
   void closing_velocities(double time, Matrix3Xd& v) override {
     solver_->closing_velocities(time, v);
   }
+  std::string save() const override { return solver_->save(); }
+  bool load(const std::string& saved) override { return solver_->load(saved); }
 
  private:
   std::unique_ptr<SheetSolver> solver_;

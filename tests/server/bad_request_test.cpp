@@ -493,8 +493,11 @@ std::vector<const MethodDescriptor*> methods() {
         v1::ServerInfo::descriptor()->file(), v1::Session::descriptor()->file(),
         v1::Textile::descriptor()->file()}) {
     for (int i = 0; i < file->service_count(); ++i) {
-      for (int k = 0; k < file->service(i)->method_count(); ++k)
+      for (int k = 0; k < file->service(i)->method_count(); ++k) {
+        // gRPC shows a stream that cannot be decoded as one that has ended
+        if (file->service(i)->method(k)->client_streaming()) continue;
         methods.push_back(file->service(i)->method(k));
+      }
     }
   }
   return methods;

@@ -77,7 +77,7 @@ std::string write_whole(const fs::path& path, const std::string& bytes) {
   const bool written = file &&
                        std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() &&
                        std::fflush(file.get()) == 0 && fsync(fileno(file.get())) == 0;
-  const std::string why = written ? "" : std::strerror(errno);
+  std::string why = written ? "" : std::strerror(errno);
   file.reset();
   if (!written) {
     fs::remove(part, error);

@@ -31,7 +31,7 @@ class RestartedWeftd : public ClientTest {
     weftd_ = std::make_unique<Process>(
         "weftd",
         std::vector<std::string>{"--host", host_, "--port", port_, "--data-dir", path("data"),
-                                 "--snapshot-ms", "0", "--log-level", "off"},
+                                 "--snapshot-ms", "5", "--log-level", "off"},
         path("weftd.txt"), file_size_limit);
     std::string line;
     while (line.find('\n') == std::string::npos) {

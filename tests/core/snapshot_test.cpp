@@ -215,7 +215,7 @@ TEST(Snapshot, ThatDoesNotFitTheSceneIsRefusedAndChangesNothing) {
     faults[i](bad);
     EXPECT_FALSE(simulation.restore(bad));
   }
-  for (const std::size_t other : {1, 2, 3, 11}) {
+  for (const std::size_t other : {1U, 2U, 3U, 11U}) {
     Scene scene = busy();
     kVariants[other].set(scene);
     EXPECT_FALSE(Simulation(scene).restore(good)) << kVariants[other].name;

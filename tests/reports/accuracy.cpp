@@ -693,12 +693,14 @@ class AccuracyPage {
   // Chord angles or moduli by quantity and spacing, beside what was asked.
   static void add_values(const LabReport& report, const std::string& quantity,
                          const std::string& law, std::vector<Cells>& rows) {
-    for (const LabValue& value : report.values)
-      if (value.quantity == quantity)
-        rows.push_back({quantity, law, fmt::format("{:.3g}", 1e3 * value.spacing),
-                        fmt::format("{:.4g} {}", value.asked, value.unit),
-                        fmt::format("{:.4g}", value.found),
-                        fmt::format("{:+.1f} %", 100 * (value.found / value.asked - 1))});
+    for (const LabValue& value : report.values) {
+      if (value.quantity != quantity) continue;
+      const double asked = value.asked.value();
+      rows.push_back({quantity, law, fmt::format("{:.3g}", 1e3 * value.spacing),
+                      fmt::format("{:.4g} {}", asked, value.unit),
+                      fmt::format("{:.4g}", value.found),
+                      fmt::format("{:+.1f} %", 100 * (value.found / asked - 1))});
+    }
   }
 
   static double largest_error(const BendingFunction& function) {

@@ -1,3 +1,5 @@
+#include <grpcpp/grpcpp.h>
+
 #include <cstring>
 #include <thread>
 
@@ -52,7 +54,8 @@ void expect_let_go(Service& service, const v1::Session& session, int particle) {
 // A call of Interact.
 class Hand {
  public:
-  explicit Hand(Service& service) : stream_(service.sessions->Interact(&context_)) {}
+  explicit Hand(Sessions& sessions) : stream_(sessions.Interact(&context_)) {}
+  explicit Hand(Service& service) : Hand(*service.sessions) {}
 
   void send(const v1::Session& session, std::int64_t sequence, const v1::Action& action) {
     v1::InteractRequest request;
@@ -173,9 +176,14 @@ TEST(Interact, LetsGoWhenTheClientDiesOrErrsAndOnlyOfItsOwn) {
 }
 
 TEST(Interact, EndsWithAServerThatDrainsAndRefusesNonsense) {
-  Service service;
+  ServerOptions options = Service::in_process();
+  options.host = "127.0.0.1";
+  Service service(options);
   const v1::Session session = service.create();
-  Hand hand(service), confused(service);
+  // over a socket: in a process gRPC drops the end of a call whose client may still write
+  const auto remote = v1::SessionService::NewStub(
+      grpc::CreateChannel(service.server.address(), grpc::InsecureChannelCredentials()));
+  Hand hand(*remote), confused(service);
   hand.send(session, 1, grab(7));
   hand.answer();
   confused.send(session, 0, grab(8));

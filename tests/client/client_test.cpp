@@ -1,24 +1,12 @@
 #include "tests/client/client_test.h"
 
-#include <stdlib.h>
-
 #include <fstream>
 #include <sstream>
-#include <stdexcept>
 
 #include "client/scene_file.h"
 #include "client/weft.h"
 
 namespace weft::testing {
-namespace {
-
-std::filesystem::path make_directory() {
-  std::string name = (std::filesystem::temp_directory_path() / "weft-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary directory");
-  return name;
-}
-
-}  // namespace
 
 Outcome run_weft(std::vector<std::string> arguments, const std::stop_token& stop) {
   std::ostringstream out;
@@ -36,10 +24,6 @@ std::string read_file(const std::filesystem::path& path) {
 void write_file(const std::filesystem::path& path, const std::string& text) {
   std::ofstream(path, std::ios::binary) << text;
 }
-
-ClientTest::ClientTest() : directory_(make_directory()) {}
-
-ClientTest::~ClientTest() { std::filesystem::remove_all(directory_); }
 
 Outcome ClientTest::weft(std::vector<std::string> arguments, const std::stop_token& stop) {
   arguments.insert(arguments.end(), {"--server", address_});

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/support/service/service.h"
+#include "tests/support/temporary_directory.h"
 
 namespace weft::testing {
 
@@ -30,15 +31,12 @@ void write_file(const std::filesystem::path& path, const std::string& text);
 // A server that listens on a port of its own, and a directory for files.
 class ClientTest : public ::testing::Test {
  protected:
-  ClientTest();
-  ~ClientTest() override;
-
   // A command against the server.
   Outcome weft(std::vector<std::string> arguments, const std::stop_token& stop = {});
   // One that must succeed; what it answers to --json.
   nlohmann::json ask(std::vector<std::string> arguments);
 
-  std::string path(const std::string& name) const { return (directory_ / name).string(); }
+  std::string path(const std::string& name) const { return directory_.path(name); }
   std::string scene_file(const v1::Scene& scene, const std::string& name = "scene.json") const;
   // Frames first to last as the server streams them to a recorder.
   std::vector<v1::Frame> stream(const std::string& session, std::int64_t first, std::int64_t last,
@@ -48,7 +46,7 @@ class ClientTest : public ::testing::Test {
   const std::string address_ = service_.server.address();
 
  private:
-  std::filesystem::path directory_;
+  TemporaryDirectory directory_;
 };
 
 }  // namespace weft::testing

@@ -1,7 +1,5 @@
 #include "tests/fuzz/scratch.h"
 
-#include <stdlib.h>
-
 #include <filesystem>
 #include <fstream>
 
@@ -11,12 +9,6 @@
 #include "client/recording/reader.h"
 
 namespace weft {
-
-Scratch::Scratch() : directory_("/dev/shm/weft-fuzz-XXXXXX") {
-  if (mkdtemp(directory_.data()) == nullptr) std::abort();
-}
-
-Scratch::~Scratch() { std::filesystem::remove_all(directory_); }
 
 void Scratch::write(std::string_view bytes) const {
   std::filesystem::remove(file() + "-journal");
@@ -29,11 +21,11 @@ void Scratch::use() const {
     client::RecordingReader recording(file());
     client::inspect(recording, [](std::int64_t) {});
     for (const auto& [format, name] :
-         {std::pair(ExportFormat::kObj, "/obj"), std::pair(ExportFormat::kPc2, "/a.pc2"),
-          std::pair(ExportFormat::kMdd, "/a.mdd"), std::pair(ExportFormat::kGltf, "/a.glb"),
-          std::pair(ExportFormat::kVtk, "/a.pvd"), std::pair(ExportFormat::kCsv, "/a.csv")}) {
+         {std::pair(ExportFormat::kObj, "obj"), std::pair(ExportFormat::kPc2, "a.pc2"),
+          std::pair(ExportFormat::kMdd, "a.mdd"), std::pair(ExportFormat::kGltf, "a.glb"),
+          std::pair(ExportFormat::kVtk, "a.pvd"), std::pair(ExportFormat::kCsv, "a.csv")}) {
       try {
-        client::export_recording(recording, {.format = format, .path = directory_ + name},
+        client::export_recording(recording, {.format = format, .path = directory_.path(name)},
                                  [](const auto&) {});
       } catch (const client::Problem&) {
         continue;

@@ -1,5 +1,4 @@
 #include <spdlog/spdlog.h>
-#include <stdlib.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -10,6 +9,7 @@
 
 #include "server/store/snapshot_files.h"
 #include "tests/support/service/service.h"
+#include "tests/support/temporary_directory.h"
 
 namespace weft::testing {
 namespace {
@@ -21,19 +21,11 @@ using Sessions = Service::Sessions;
 // A directory with sessions in it, and servers that take them over from each other.
 class Restart : public ::testing::Test {
  protected:
-  Restart() {
-    std::string name = (std::filesystem::temp_directory_path() / "weft-XXXXXX").string();
-    directory_ = mkdtemp(name.data());
-    start();
-  }
-  ~Restart() override {
-    service_.reset();
-    std::filesystem::remove_all(directory_);
-  }
+  Restart() { start(); }
 
   void start() {
     ServerOptions options = Service::in_process();
-    options.data_dir = directory_;
+    options.data_dir = directory_.name();
     options.snapshot_ms = snapshot_ms_;
     service_ = std::make_unique<Service>(options);
   }
@@ -61,7 +53,7 @@ class Restart : public ::testing::Test {
     ASSERT_EQ(service_->error(&Sessions::UpdateTextile, request).code, grpc::StatusCode::OK);
   }
 
-  std::string file() const { return directory_ + "/sessions.db"; }
+  std::string file() const { return directory_.path("sessions.db"); }
 
   // Frames that this server has computed, restored ones among them.
   std::int64_t computed() {
@@ -70,7 +62,7 @@ class Restart : public ::testing::Test {
     EXPECT_TRUE(service_->servers->GetServerStats(&context, {}, &stats).ok());
     return stats.frames();
   }
-  std::string directory_;
+  const TemporaryDirectory directory_;
   int snapshot_ms_ = 2000;
   std::unique_ptr<Service> service_;
 };
@@ -214,7 +206,7 @@ TEST_F(Restart, KeepsAFailedSessionFailed) {
 
 TEST_F(Restart, HoldsFramesForAReaderThatComesBack) {
   ServerOptions options = Service::in_process();
-  options.data_dir = directory_;
+  options.data_dir = directory_.name();
   options.limits.history_bytes_per_session = 50'000;  // some 30 frames
   service_.reset();
   service_ = std::make_unique<Service>(options);
@@ -239,7 +231,7 @@ TEST_F(Restart, HoldsFramesForAReaderThatComesBack) {
 
 TEST_F(Restart, RefusesADirectoryInUse) {
   ServerOptions options = Service::in_process();
-  options.data_dir = directory_;
+  options.data_dir = directory_.name();
   try {
     const Server second(options);
     ADD_FAILURE() << "it serves";
@@ -323,7 +315,7 @@ class RestartWithSnapshots : public Restart {
   }
 
   std::filesystem::path snapshots_of(const v1::Session& session) const {
-    return std::filesystem::path(directory_) / "snapshots" / session.uid();
+    return std::filesystem::path(directory_.path("snapshots")) / session.uid();
   }
   // Steps until there is a snapshot of the newest frame. One is left out while the one before it is
   // written.
@@ -387,7 +379,7 @@ TEST_F(RestartWithSnapshots, NeverMistakesADamagedOneForASound) {
   };
   const std::string good = content(path(newest));
   spdlog::set_level(spdlog::level::off);
-  const SnapshotFiles files(directory_ + "/snapshots");
+  const SnapshotFiles files(directory_.path("snapshots"));
   const auto frame_with = [&](const std::string& bytes) {
     std::ofstream(path(newest), std::ios::binary) << bytes;
     return files.read(session.uid(), std::nullopt)->simulation.frame;
@@ -418,8 +410,8 @@ TEST_F(RestartWithSnapshots, NeverMistakesADamagedOneForASound) {
 
 TEST_F(RestartWithSnapshots, GoesOnWhereTheyCannotBeWritten) {
   service_.reset();
-  std::filesystem::remove_all(directory_ + "/snapshots");
-  std::ofstream(directory_ + "/snapshots") << "no directory";
+  std::filesystem::remove_all(directory_.path("snapshots"));
+  std::ofstream(directory_.path("snapshots")) << "no directory";
   start();
   const v1::Session session = service_->create();
   service_->step(session, 30);

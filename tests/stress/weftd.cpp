@@ -5,7 +5,6 @@
 
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -14,12 +13,6 @@
 
 namespace weft::stress {
 namespace {
-
-std::filesystem::path make_directory() {
-  std::string name = (std::filesystem::temp_directory_path() / "weft-stress-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary directory");
-  return name;
-}
 
 std::string text_of(const std::filesystem::path& path) {
   std::ostringstream text;
@@ -36,16 +29,13 @@ std::int64_t number_behind(const std::string& text, const std::string& label) {
 
 }  // namespace
 
-Weftd::Weftd(std::vector<std::string> flags) : directory_(make_directory()), flags_(flags) {
+Weftd::Weftd(std::vector<std::string> flags) : flags_(flags) {
   const auto id = static_cast<unsigned>(getpid());
   host_ = fmt::format("127.{}.{}.{}", 1 + (id >> 16) % 250, (id >> 8) & 255, 1 + (id & 255) % 250);
   start();
 }
 
-Weftd::~Weftd() {
-  process_.reset();
-  std::filesystem::remove_all(directory_);
-}
+Weftd::~Weftd() = default;
 
 void Weftd::start() {
   std::vector<std::string> flags{"--host",     host_,        "--port",      port_,

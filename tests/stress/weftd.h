@@ -1,13 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "client/connection.h"
 #include "tests/support/service/process.h"
+#include "tests/support/temporary_directory.h"
 
 namespace weft::stress {
 
@@ -31,7 +31,7 @@ class Weftd {
 
   std::string address() const { return host_ + ":" + port_; }
   std::unique_ptr<client::Connection> connect() const;
-  std::string path(const std::string& name) const { return (directory_ / name).string(); }
+  std::string path(const std::string& name) const { return directory_.path(name); }
   Usage usage() const;
 
   void kill_and_start();
@@ -41,7 +41,7 @@ class Weftd {
  private:
   void start();
 
-  std::filesystem::path directory_;
+  testing::TemporaryDirectory directory_;
   std::vector<std::string> flags_;
   std::string host_;
   std::string port_ = "0";

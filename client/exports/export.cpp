@@ -61,6 +61,8 @@ std::vector<std::int64_t> frames_to_export(RecordingReader& recording, const Exp
   for (const double time : order.times_s) numbers.push_back(find_frame_at(recording, time));
   if (!order.times_s.empty()) return numbers;
   const std::int64_t last = std::min(order.frames.last, recording.last_frame());
+  if (recording.last_frame() >= recording.first_frame() + recording.count_frames())
+    throw damaged(recording.path(), "it holds fewer frames than it says");
   for (auto n = std::max(order.frames.first, recording.first_frame()); n <= last; n += order.every)
     numbers.push_back(n);
   return numbers;
@@ -97,6 +99,7 @@ ExportResult export_recording(RecordingReader& recording, const ExportOrder& ord
   std::error_code error;  // there is no such file yet
   if (std::filesystem::equivalent(order.path, recording.path(), error))
     throw unwritable(order.path, "it is the recording itself");
+  recording.read(numbers.front());  // its particles are as many as the header says, or it throws
   const auto writer = make_writer(order, part, numbers);
   ExportResult result{.frames = 0, .particles = static_cast<std::int64_t>(part.count)};
   for (const std::int64_t number : numbers) {

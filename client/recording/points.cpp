@@ -34,8 +34,11 @@ Points read_planes(const std::string& planes, std::size_t first, std::size_t cou
 std::size_t array_bytes(const v1::StreamHeader& header) {
   constexpr std::int64_t kMostParticles = std::numeric_limits<std::int32_t>::max();
   std::int64_t particles = 0;
-  bool sound = header.format().encoding() == v1::FRAME_ENCODING_FLOAT32 ||
-               header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
+  // frames are counted from here
+  constexpr std::int64_t kLastStart = std::int64_t{1} << 62;
+  bool sound = header.start_frame() >= 0 && header.start_frame() <= kLastStart;
+  sound = sound && (header.format().encoding() == v1::FRAME_ENCODING_FLOAT32 ||
+                    header.format().encoding() == v1::FRAME_ENCODING_FLOAT64);
   for (const auto& sheet : header.sheets()) {
     sound = sound && sheet.rows() > 0 && sheet.columns() > 0 && sheet.first_particle() == particles;
     if (!sound) break;
@@ -44,7 +47,7 @@ std::size_t array_bytes(const v1::StreamHeader& header) {
   }
   if (!sound || particles == 0) {
     throw Problem(Exit::kRefused, "DATA_LOSS", "HEADER_UNREADABLE",
-                  "the header names sheets or a format that no stream has");
+                  "the header names sheets, a format or a first frame that no stream has");
   }
   const bool doubles = header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
   return 3 * static_cast<std::size_t>(particles) * (doubles ? sizeof(double) : sizeof(float));

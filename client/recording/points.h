@@ -13,7 +13,7 @@ struct Points {
 };
 
 // Bytes of an array of the stream's frames. Throws where the header's sheets do not follow each
-// other as sheets do, or the format is unknown.
+// other as sheets do, or the format is unknown, or no frame has the number of the first.
 std::size_t array_bytes(const v1::StreamHeader& header);
 
 // Whether the arrays of the frame are as long as they should be.

@@ -46,6 +46,11 @@ RecordingReader::RecordingReader(const std::string& path)
   }
 }
 
+std::int64_t RecordingReader::count_frames() {
+  Statement row = database_.prepare("SELECT count(*) FROM frames");
+  return row.step() ? row.integer(0) : 0;
+}
+
 v1::Frame RecordingReader::read(std::int64_t number) {
   Statement row = database_.prepare("SELECT time_s, frame, checksum FROM frames WHERE number = ?");
   if (!row.bind(1, number).step()) {

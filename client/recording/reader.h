@@ -24,6 +24,8 @@ class RecordingReader {
   // It holds every frame from first_frame() to last_frame(); one less where there is none.
   std::int64_t first_frame() const { return header_.start_frame(); }
   std::int64_t last_frame() const { return last_frame_; }
+  // Those that the file really has.
+  std::int64_t count_frames();
 
   // The frame, as it was written, its arrays as long as the header says; else a Problem.
   v1::Frame read(std::int64_t number);

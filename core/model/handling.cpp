@@ -65,6 +65,7 @@ class Handler {
 
     if (action.kind == Kind::kGrab) {
       if (grabbed) return wrong(" is grabbed already");
+      if (!is_near(".particle", offset_of(sheet, particle))) return;
       hold(sheet, particle);
       return handling_.grabs.push_back({sheet, particle, action.hand, pinned});
     }
@@ -72,7 +73,7 @@ class Handler {
       if (pinned) return wrong(" is pinned already");
       if (grabbed)
         grab->pinned = true;
-      else
+      else if (is_near(".particle", offset_of(sheet, particle)))
         hold(sheet, particle);
       return;
     }
@@ -88,8 +89,18 @@ class Handler {
     if (action.hand != 0 && action.hand != grab->hand)
       return wrong(" is grabbed by another stream or call");
     if (action.kind == Kind::kRelease) return release(grab);
-    lead(action, offset_at(holder->path, moment_.time),
-         action.target - moment_.start(sheet, particle), holder->path);
+    const Vector3d to = action.target - moment_.start(sheet, particle);
+    if (is_near(".target_m", to))
+      lead(action, offset_at(holder->path, moment_.time), to, holder->path);
+  }
+
+  // What is held has a path, bounded as those of a scene are.
+  bool is_near(const char* field, const Vector3d& offset) {
+    if (offset.cwiseAbs().maxCoeff() <= kMostOffset) return true;
+    problem(field,
+            join("lies ", offset.norm() / 1000, " km from the particle's start; a path reaches ",
+                 kMostOffset / 1000, " km along each axis"));
+    return false;
   }
 
   // The sheet or collider of that name, or the only one.
@@ -141,12 +152,16 @@ class Handler {
     });
   }
 
+  // Where it is now, from its start.
+  Vector3d offset_of(std::size_t sheet, int particle) {
+    const auto pin = find_pin(sheet, particle);
+    if (pin != handling_.pins[sheet].end()) return offset_at(pin->path, moment_.time);
+    return moment_.position(sheet, particle) - moment_.start(sheet, particle);
+  }
+
   // Where it is, by a pin of its own.
   void hold(std::size_t sheet, int particle) {
-    const auto pin = find_pin(sheet, particle);
-    const Vector3d offset = pin == handling_.pins[sheet].end()
-                                ? moment_.position(sheet, particle) - moment_.start(sheet, particle)
-                                : offset_at(pin->path, moment_.time);
+    const Vector3d offset = offset_of(sheet, particle);
     free(sheet, particle);
     handling_.pins[sheet].push_back({{particle}, {{moment_.time, offset}}});
   }

@@ -62,7 +62,7 @@ class Check {
         problem(key + ".time_s", text(path[k].time) +
                                      " s does not come after the keyframe before it, " +
                                      text(path[k - 1].time) + " s");
-      position(key + ".offset_m", path[k].offset);
+      vector(key + ".offset_m", path[k].offset, kMostOffset, "m");
     }
   }
 

@@ -14,6 +14,9 @@ namespace weft {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
+// Of a keyframe along each axis, m.
+inline constexpr double kMostOffset = 1e4;
+
 struct Keyframe {
   double time = 0;                     // s
   Vector3d offset = Vector3d::Zero();  // from the start, m

@@ -50,6 +50,7 @@ class LatticeSolver : public SheetSolver {
       value(State::kStep2, at) = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
     });
     std::fill(gap_.begin(), gap_.end(), 0);
+    least_gap_ = come_ = 0;
   }
 
   void advance(double time, Crew& crew) override {
@@ -79,21 +80,27 @@ class LatticeSolver : public SheetSolver {
   void resolve(const Contacts& contacts, Crew& crew) override {
     law_.measured = true;
     constexpr double kRounding = 1.001;
-    const double approach = kRounding * (moved_ + contacts.reach());
+    come_ += kRounding * (moved_ + contacts.reach());
+    if (come_ < least_gap_) return;
     near_.clear();
     for (int r = 0; r < law_.layout.rows; ++r)
-      if ((gap_[static_cast<std::size_t>(r)] -= approach) <= 0) near_.push_back(r);
+      if ((gap_[static_cast<std::size_t>(r)] -= come_) <= 0) near_.push_back(r);
+    come_ = 0;
+
     const int count = static_cast<int>(near_.size());
-    const auto resolve_part = [&](int part, int parts) {
+    const int parts = std::clamp(count, 1, bands(crew));
+    const auto resolve_part = [&](int part) {
       for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
         const int r = near_[static_cast<std::size_t>(i)];
         gap_[static_cast<std::size_t>(r)] =
             resolve_row(contacts, origin_, law_.compensated, r, state_);
       }
     };
-    const int parts = std::min(bands(crew), count);
-    if (parts <= 1) return resolve_part(0, 1);
-    crew.run(parts, [&](int part) { resolve_part(part, parts); });
+    if (parts == 1)
+      resolve_part(0);
+    else
+      crew.run(parts, resolve_part);
+    least_gap_ = *std::min_element(gap_.begin(), gap_.end());
   }
 
   // Smaller bands cost more to share than they take.
@@ -128,6 +135,7 @@ class LatticeSolver : public SheetSolver {
     saved.put(kind());
     saved.put(origin_.data(), 3);
     saved.put(law_.measured ? 1 : 0);
+    saved.put(come_);
     saved.put(gap_.data(), gap_.size());
     for (int plane = 0; plane < state_.planes(); ++plane)
       for_each_particle([&](int, Place at) { saved.put(value(plane, at)); });
@@ -141,7 +149,9 @@ class LatticeSolver : public SheetSolver {
     loaded.take(origin_.data(), 3);
     loaded.take(&measured, 1);
     law_.measured = measured != 0;
+    loaded.take(&come_, 1);
     loaded.take(gap_.data(), gap_.size());
+    least_gap_ = *std::min_element(gap_.begin(), gap_.end());
     for (int plane = 0; plane < state_.planes(); ++plane)
       for_each_particle([&](int, Place at) { loaded.take(&value(plane, at), 1); });
     return loaded.all_taken();
@@ -202,7 +212,9 @@ class LatticeSolver : public SheetSolver {
   bool started_ = false;
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
   double moved_ = 0;                    // farthest displacement of the last step, m
-  std::vector<double> gap_;             // of each row to the nearest skin, at most, m
+  std::vector<double> gap_;             // of each row to the nearest skin, at least, m
+  double least_gap_ = 0;                // of all rows
+  double come_ = 0;                     // how far sheet and colliders may have come since, m
   std::vector<int> near_;               // rows that may touch, in this step
 };
 

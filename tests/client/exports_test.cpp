@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "client/recording/reader.h"
+#include "client/recording/writer.h"
 #include "tests/client/client_test.h"
 
 namespace weft::testing {
@@ -118,6 +119,27 @@ Number number_at(const std::string& bytes, std::size_t place) {
   Number number{};
   std::memcpy(&number, bytes.data() + place, sizeof(number));
   return number;
+}
+
+// Whoever writes one may claim what he likes: neither takes memory for what is not there.
+TEST_F(ExportsTest, RecordingsThatClaimMoreThanTheyHoldAreDamaged) {
+  const client::RecordingReader recording(file_);
+  v1::Frame frame = client::RecordingReader(file_).read(0);
+  v1::StreamHeader huge = recording.header();
+  huge.mutable_sheets()->DeleteSubrange(1, 1);
+  huge.mutable_sheets(0)->set_rows(40'000);
+  huge.mutable_sheets(0)->set_columns(40'000);
+  client::RecordingWriter(path("huge.weft"), true, recording.scene(), huge).add(frame);
+  frame.set_number(std::int64_t{1} << 60);
+  client::RecordingWriter(path("long.weft"), true, recording.scene(), recording.header())
+      .add(frame);
+  for (const auto& [name, why] : {std::pair("huge.weft", "frame 0 is not as long as its header"),
+                                  std::pair("long.weft", "it holds fewer frames than it says")}) {
+    const Outcome outcome =
+        weft({"export", path(name), "--format", "gltf", "-o", path("cloth.glb")});
+    EXPECT_EQ(outcome.exit, 4);
+    EXPECT_THAT(outcome.err, HasSubstr(why));
+  }
 }
 
 TEST_F(ExportsTest, Pc2IsAPointCacheOfAllFrames) {

@@ -201,6 +201,10 @@ TEST(Handling, SaysWhatIsWrongWithActions) {
   EXPECT_EQ(problem(drag(9, Vector3d(x.col(9)) + Vector3d(3, 0, 0), 0.1)),
             "actions[1].drag.duration_s: 0.1 s is too short for 3 m: at 20 m/s, the most, they "
             "take 0.15 s");
+  EXPECT_EQ(
+      problem(drag(9, {-1e4, 1e4, 0}, 1000)),
+      "actions[1].drag.target_m: lies 14.14 km from the particle's start; a path reaches 10 km "
+      "along each axis");
   Action stream = act(Kind::kRelease, 9);
   stream.hand = 1;
   EXPECT_EQ(problem(stream), "actions[1].release.particle: 9 is grabbed by another stream or call");

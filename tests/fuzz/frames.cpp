@@ -5,6 +5,7 @@
 #include <string>
 
 #include "client/problem.h"
+#include "client/recording/points.h"
 #include "client/recording/writer.h"
 #include "tests/fuzz/scratch.h"
 
@@ -60,7 +61,9 @@ std::string some_array(FuzzedDataProvider& input, const StreamHeader& header) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) try {
   static const weft::Scratch scratch;
   FuzzedDataProvider input(data, size);
-  const StreamHeader header = some_header(input);
+  StreamHeader header;
+  if (!header.ParseFromString(some_header(input).SerializeAsString())) return 0;  // not UTF-8
+  weft::client::array_bytes(header);  // whoever takes frames in asks this first
   {
     weft::client::RecordingWriter writer(scratch.file(), true, {}, header);
     for (int count = 0; input.remaining_bytes() > 0; ++count) {

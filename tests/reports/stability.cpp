@@ -116,6 +116,8 @@ class Report {
     }
     constexpr std::size_t kMostRows = 40;  // the rest is in the CSV file
     rows.resize(std::min(rows.size(), kMostRows));
+    for (auto& series : plot.series)
+      series.points.resize(std::min(series.points.size(), kMostRows));
     page_.table({name, "linear bound s", "estimate s", "measured s", "measured / bound",
                  "measured / estimate", "damping ratio"},
                 rows);

@@ -1,0 +1,100 @@
+// Frames of a scene, for their instructions to be counted: weft-counts CASE.
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <string>
+
+#include "core/simulation.h"
+#include "tests/support/core/scenes.h"
+
+namespace weft::counts {
+namespace {
+
+RawTextile& raw(Scene& scene) { return std::get<RawTextile>(scene.sheets[0].textile.model); }
+
+// A curtain of the paper's textile that swings.
+Scene curtain() {
+  SheetDefinition sheet = testing::flat_sheet(31, 31);
+  sheet.pins = {{{0, 30}, {}}};
+  Scene scene = testing::floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.solver.frame_step = 16 * 2e-4;
+  scene.solver.substep = 2e-4;
+  return scene;
+}
+
+Simulation simulation(Scene scene, int frames = 2) {
+  Simulation made(std::move(scene));
+  for (int frame = 0; frame < frames; ++frame)
+    if (!made.advance_frame()) std::abort();
+  return made;
+}
+
+Simulation plain() { return simulation(curtain()); }
+
+Simulation with_far_collider() {
+  Scene scene = curtain();
+  scene.colliders = {{"ball", Sphere{{50, 0, 0}, 0.1}, 0.3, {}}};
+  return simulation(scene);
+}
+
+Simulation with_wind() {
+  Scene scene = curtain();
+  scene.environment.wind = Wind{};
+  return simulation(scene);
+}
+
+Simulation without_damping() {
+  Scene scene = curtain();
+  scene.sheets[0].textile.damping = 0;
+  return simulation(scene);
+}
+
+Simulation without_bending() {
+  Scene scene = curtain();
+  raw(scene).bend = 0;
+  return simulation(scene);
+}
+
+Simulation bending_taken_away() {
+  Simulation made = plain();
+  Scene scene = made.scene();
+  raw(scene).bend = 0;
+  if (made.set_textile(0, scene.sheets[0].textile)) std::abort();
+  return made;
+}
+
+Simulation asleep() {
+  Scene scene = curtain();
+  scene.environment.gravity.setZero();
+  return simulation(scene, 40);
+}
+
+}  // namespace
+
+// By name, for the counter.
+[[gnu::noinline]] void counted(Simulation& simulation) {
+  for (int frame = 0; frame < 4; ++frame)
+    if (!simulation.advance_frame()) std::abort();
+}
+
+}  // namespace weft::counts
+
+int main(int count, char** arguments) {
+  using namespace weft::counts;
+  const std::map<std::string, weft::Simulation (*)()> cases = {
+      {"plain", plain},
+      {"far_collider", with_far_collider},
+      {"wind", with_wind},
+      {"no_damping", without_damping},
+      {"no_bending", without_bending},
+      {"bending_taken_away", bending_taken_away},
+      {"asleep", asleep}};
+  const auto found = count == 2 ? cases.find(arguments[1]) : cases.end();
+  if (found == cases.end()) {
+    std::fputs("weft-counts CASE: none of that name\n", stderr);
+    return 2;
+  }
+  weft::Simulation simulation = found->second();
+  counted(simulation);
+}

@@ -83,6 +83,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_health(app, context);
   add_load(app, context);
   add_demo(app, context);
+  add_completion(app, context);
 }
 
 }  // namespace
@@ -101,6 +102,10 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
   app.footer(kFooter);  // the commands keep the line above
 
   try {
+    if (arguments.size() > 1 && arguments[0] == "completion" && arguments[1] == "words") {
+      terminal.out << completions(app, {arguments.begin() + 2, arguments.end()}, context);
+      return static_cast<int>(Exit::kDone);
+    }
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them
     app.parse(std::move(arguments));
     if (app.get_subcommands().empty()) throw usage_problem("which command? see weft --help");

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
 #include "client/context.h"
 #include "client/recording/frame_range.h"
@@ -30,6 +31,9 @@ void add_script(CLI::App& app, Context& context);
 void add_health(CLI::App& app, Context& context);
 void add_load(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
+void add_completion(CLI::App& app, Context& context);
+// What may stand for the last of the words after "weft", a line each.
+std::string completions(const CLI::App& app, std::vector<std::string> words, Context& context);
 
 using Sessions = v1::SessionService::Stub;
 using Servers = v1::ServerService::Stub;

@@ -158,6 +158,22 @@ TEST_F(CommandsTest, HelpIsAnAnswer) {
   EXPECT_THAT(weft({"record", "--help"}).out, HasSubstr("--until-rest"));
 }
 
+TEST_F(CommandsTest, AShellCompletesCommandsOptionsValuesAndSessions) {
+  service_.create(small_scene(), "drape");
+  setenv("WEFT_SERVER", address_.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
+  const auto completed = [](std::vector<std::string> words) {
+    words.insert(words.begin(), {"completion", "words"});
+    return run_weft(words).out;
+  };
+  EXPECT_EQ(completed({"text"}), "textile\n");
+  EXPECT_EQ(completed({"session", ""}), "create\ndelete\nget\nlist\n");
+  EXPECT_EQ(completed({"record", "drape", "--e"}), "--embedded\n--encoding\n");
+  EXPECT_EQ(completed({"export", "a.weft", "--format", "p"}), "pc2\n");
+  EXPECT_EQ(completed({"run", ""}), "drape\n");
+  EXPECT_EQ(completed({"export", ""}), "") << "the shell names files";
+  unsetenv("WEFT_SERVER");  // NOLINT(concurrency-mt-unsafe)
+}
+
 TEST_F(CommandsTest, EveryErrorIsJsonWhenAskedFor) {
   for (const std::vector<std::string>& command :
        std::vector<std::vector<std::string>>{{"session", "get", "nobody"},

@@ -376,10 +376,7 @@ class AccuracyPage {
     page_.table({"scene", "ms per s", "RMS m", "largest m", "energy J", "as close, faster by",
                  "as fast, closer by"},
                 rows);
-    page_.text(fmt::format(
-        "The default is not beaten in {} of {}. In wind everything runs in double, one connection "
-        "after the other: there the default is 32 segments by Verlet in that way.",
-        best_of, all_.size()));
+    page_.text(fmt::format("The default is not beaten in {} of {}.", best_of, all_.size()));
   }
 
   void precision() {

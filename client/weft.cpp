@@ -17,6 +17,7 @@ constexpr const char* kFooter = R"(A first run:
   weft session create scene.json --id drape
   weft record drape --run --until-rest -o drape.weft
   weft view drape.weft -o drape.html
+  weft render drape.weft -o drape.png
   weft export drape.weft --format obj -o drape
 
 With --embedded no server is needed: it lives within the command, and SESSION is a scene file.
@@ -78,6 +79,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_diff(app, context);
   add_export(app, context);
   add_plot(app, context);
+  add_render(app, context);
   add_view(app, context);
   add_script(app, context);
   add_health(app, context);

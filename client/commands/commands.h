@@ -26,6 +26,7 @@ void add_verify(CLI::App& app, Context& context);
 void add_diff(CLI::App& app, Context& context);
 void add_export(CLI::App& app, Context& context);
 void add_plot(CLI::App& app, Context& context);
+void add_render(CLI::App& app, Context& context);
 void add_view(CLI::App& app, Context& context);
 void add_script(CLI::App& app, Context& context);
 void add_health(CLI::App& app, Context& context);

@@ -2,14 +2,34 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 
 #include "client/problem.h"
 
 namespace weft::client {
+namespace {
+
+// Where a file is written until it is whole. Devices and pipes are written to at once.
+std::string unfinished_name(const std::string& path) {
+  std::error_code error;
+  const bool other =
+      std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error);
+  return other ? path : path + ".part";
+}
+
+}  // namespace
 
 OutputFile::OutputFile(std::string path)
-    : path_(std::move(path)), file_(path_, std::ios::binary | std::ios::trunc) {
+    : path_(std::move(path)),
+      unfinished_(unfinished_name(path_)),
+      file_(unfinished_, std::ios::binary | std::ios::trunc) {
   check();
+}
+
+OutputFile::~OutputFile() {
+  if (closed_ || unfinished_ == path_) return;
+  std::error_code error;  // there is nobody to tell
+  std::filesystem::remove(unfinished_, error);
 }
 
 void OutputFile::write(std::string_view bytes) {
@@ -25,6 +45,10 @@ void OutputFile::seek(std::streamoff place) {
 void OutputFile::close() {
   file_.close();
   check();
+  std::error_code error;
+  if (unfinished_ != path_) std::filesystem::rename(unfinished_, path_, error);
+  if (error) throw unwritable(path_, error.message());
+  closed_ = true;
 }
 
 void OutputFile::check() {

@@ -13,10 +13,14 @@ std::string_view bytes_of(const std::vector<Number>& numbers) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
 }
 
-// A file that is written; what fails is a Problem.
+// A file that is written; what fails is a Problem. It has its name when it is closed, and until
+// then the name with ".part", under which it is removed if it is never closed.
 class OutputFile {
  public:
   explicit OutputFile(std::string path);
+  ~OutputFile();
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
   void write(std::string_view bytes);
   void seek(std::streamoff place);
   void close();
@@ -25,7 +29,9 @@ class OutputFile {
   void check();
 
   std::string path_;
+  std::string unfinished_;
   std::ofstream file_;
+  bool closed_ = false;
 };
 
 }  // namespace weft::client

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/recording/frame_range.h"
@@ -40,5 +41,8 @@ struct PageResult {
 // length.
 PageResult write_page(const PageOrder& order,
                       const std::function<void(const std::string& doing)>& progress);
+
+// The colours of a page's numbers, from the least to the largest: "#3288bd" ...
+std::vector<std::string_view> page_ramp();
 
 }  // namespace weft::client

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "client/render/camera.h"
+#include "client/render/stage.h"
+
+namespace weft::client {
+
+// Of a picture, pixels.
+struct Size {
+  int width = 0, height = 0;
+};
+inline constexpr int kLeastSide = 64;  // of each of the frames in a picture too
+inline constexpr int kMostSide = 8192;
+inline constexpr int kMostFramesShown = 64;  // of a recording
+
+// Frames of recordings in one picture, through one camera and in one scale. Frames of one recording
+// stand in lines; of several recordings each has a line, or, with one frame each, a column.
+struct RenderOrder {
+  std::string path;
+  std::vector<std::string> recordings;
+  std::vector<std::int64_t> frames;  // none: the last
+  int contact = 0;  // instead, so many from first to last; what ended earlier shows its last
+  std::optional<Size> size;
+  Outlook outlook;
+  Colouring colouring = Colouring::kCloth;
+};
+
+struct RenderResult {
+  Size size;
+  std::vector<std::vector<std::int64_t>> frames;  // of each recording
+  double most = 0;                                // of the colouring
+  double grid_m = 0;                              // cells on the ground
+};
+
+// Writes the picture as a PNG; equal recordings give equal bytes on one machine. Holds a frame at a
+// time, and the picture twice: 400 MB at most, beside a frame.
+RenderResult render(const RenderOrder& order,
+                    const std::function<void(const std::string& doing)>& progress,
+                    const std::stop_token& stop);
+
+}  // namespace weft::client

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "client/exports/mesh.h"
+#include "client/recording/points.h"
+#include "client/recording/reader.h"
+#include "client/render/body.h"
+
+namespace weft::client {
+
+// What the cloth's colours mean.
+enum class Colouring {
+  kCloth,   // nothing: a front and a back
+  kStrain,  // largest strain of a particle's stretch connections, 0 where none is stretched
+  kSpeed,   // m/s, on the way from the frame before; of the first frame 0
+};
+
+// A sheet as it is drawn: between the particles, where there are few, by bicubic interpolation
+// (Catmull and Rom) that stays outside of bodies.
+struct Surface {
+  Points points;
+  std::vector<std::array<float, 3>> normals;
+  std::vector<float> values;  // of the colouring
+  std::vector<std::uint32_t> triangles;
+};
+
+// A frame of a recording in space. Bodies stand where their paths lead; those that actions moved
+// are not in a recording.
+struct Stage {
+  std::vector<Surface> surfaces;
+  std::vector<Body> bodies;
+  std::int64_t frame = 0;
+  double time_s = 0;
+};
+
+Stage read_stage(RecordingReader& recording, std::int64_t frame, Colouring colouring);
+
+}  // namespace weft::client

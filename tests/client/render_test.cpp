@@ -1,0 +1,216 @@
+#include <gmock/gmock.h>
+#include <png.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "tests/client/client_test.h"
+
+namespace weft::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct Rgb {
+  int red, green, blue;
+
+  int light() const { return red + green + blue; }
+  int colour() const { return std::max({red, green, blue}) - std::min({red, green, blue}); }
+  bool is_front() const { return red > green + 60 && red > blue + 60; }
+};
+
+// A PNG, as libpng reads it.
+class Image {
+ public:
+  explicit Image(const std::string& path) {
+    image_.version = PNG_IMAGE_VERSION;
+    EXPECT_NE(png_image_begin_read_from_file(&image_, path.c_str()), 0) << image_.message;
+    image_.format = PNG_FORMAT_RGB;
+    bytes_.resize(PNG_IMAGE_SIZE(image_));
+    EXPECT_NE(png_image_finish_read(&image_, nullptr, bytes_.data(), 0, nullptr), 0)
+        << image_.message;
+  }
+
+  int width() const { return static_cast<int>(image_.width); }
+  int height() const { return static_cast<int>(image_.height); }
+  Rgb at(int x, int y) const {
+    const std::size_t place = 3 * static_cast<std::size_t>(y * width() + x);
+    return {bytes_[place], bytes_[place + 1], bytes_[place + 2]};
+  }
+
+ private:
+  png_image image_{};
+  std::vector<unsigned char> bytes_;
+};
+
+// Where the front of cloth is seen, pixels.
+struct Seen {
+  int left = 10'000, right = -1, top = 10'000, bottom = -1, pixels = 0;
+
+  int width() const { return right - left + 1; }
+  int height() const { return bottom - top + 1; }
+};
+
+Seen find_front(const Image& image, int from, int to) {
+  Seen seen;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = from; x < to; ++x) {
+      if (!image.at(x, y).is_front()) continue;
+      seen = {std::min(seen.left, x), std::max(seen.right, x), std::min(seen.top, y),
+              std::max(seen.bottom, y), seen.pixels + 1};
+    }
+  }
+  return seen;
+}
+
+// A square sheet of 0.4 m that stands upright, held by every particle: its front to +z.
+v1::Scene standing_square() {
+  v1::Scene scene = small_scene();
+  v1::Sheet& sheet = *scene.mutable_sheets(0);
+  sheet.mutable_grid()->set_rows(5);
+  sheet.mutable_grid()->set_columns(5);
+  sheet.mutable_grid()->set_spacing_m(0.1);
+  v1::Rotation& rotation = *sheet.mutable_placement()->mutable_rotation();
+  rotation.set_w(1);
+  rotation.set_x(1);
+  sheet.mutable_pins(0)->clear_particles();
+  for (int i = 0; i < 25; ++i) sheet.mutable_pins(0)->add_particles(i);
+  return scene;
+}
+
+class RenderTest : public ClientTest {
+ protected:
+  std::string record(const v1::Scene& scene, const std::string& name) {
+    service_.create(scene, name);
+    ask({"record", name, "--run", "--to", "3", "-o", path(name + ".weft")});
+    return path(name + ".weft");
+  }
+  Image render(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "render");
+    arguments.insert(arguments.end(), {"-o", png_});
+    ask(arguments);
+    return Image(png_);
+  }
+
+  const std::string png_ = path("picture.png");
+};
+
+TEST_F(RenderTest, ShowsASheetInItsShapeWithinThePicture) {
+  const std::string square = record(standing_square(), "square");
+  const Image front = render({square, "--azimuth", "0", "--elevation", "0", "--size", "100x80"});
+  const Seen seen = find_front(front, 0, 100);
+  EXPECT_NEAR(seen.width(), seen.height(), 1);
+  EXPECT_GE(seen.pixels, (seen.width() - 2) * (seen.height() - 2));
+  EXPECT_NEAR((seen.left + seen.right) / 2.0, 49.5, 1);
+  EXPECT_GT(seen.height(), 50);
+  EXPECT_GT(seen.top, 0);
+
+  // from 60 degrees to the right half as wide; from behind, the other side
+  const Image turned = render({square, "--azimuth", "60", "--elevation", "0", "--size", "100x80"});
+  const Seen narrow = find_front(turned, 0, 100);
+  EXPECT_NEAR(narrow.width() / static_cast<double>(narrow.height()), 0.5, 0.12);
+  const Image back = render({square, "--azimuth", "180", "--size", "100x80"});
+  EXPECT_EQ(find_front(back, 0, 100).pixels, 0);
+  EXPECT_GT(back.at(50, 35).colour(), 30);
+}
+
+TEST_F(RenderTest, BodiesCastShadowsOnAPlane) {
+  v1::Scene scene = standing_square();
+  scene.mutable_sheets(0)->mutable_grid()->set_spacing_m(0.05);
+  scene.add_colliders()->mutable_plane()->mutable_point_m()->set_y(-0.5);
+  v1::Sphere& ball = *scene.add_colliders()->mutable_sphere();
+  ball.mutable_center_m()->set_y(-0.35);
+  ball.set_radius_m(0.1);
+  const std::string with_ball = record(scene, "with");
+  scene.mutable_colliders()->RemoveLast();
+  const std::string without = record(scene, "without");
+  const Image image = render({with_ball, without, "--elevation", "60", "--size", "200x100"});
+
+  int ball_pixels = 0;
+  int shadow_pixels = 0;
+  for (int y = 20; y < 85; ++y) {
+    for (int x = 5; x < 95; ++x) {
+      const Rgb here = image.at(x, y);
+      if (here.blue > here.red + 8) {
+        ++ball_pixels;
+      } else if (here.light() < image.at(x + 100, y).light() - 150) {
+        ++shadow_pixels;
+      }
+    }
+  }
+  EXPECT_GT(ball_pixels, 75);
+  EXPECT_GT(shadow_pixels, 75);
+}
+
+TEST_F(RenderTest, ComparesThroughOneCamera) {
+  const std::string square = record(standing_square(), "square");
+  v1::Scene scene = standing_square();
+  scene.mutable_sheets(0)->mutable_grid()->set_spacing_m(0.05);
+  const std::string half = record(scene, "half");
+  const Image image =
+      render({square, half, "--azimuth", "0", "--elevation", "0", "--size", "160x80"});
+  const Seen left = find_front(image, 0, 80);
+  const Seen right = find_front(image, 80, 160);
+  EXPECT_NEAR(left.width() / 2.0, right.width(), 1);
+  EXPECT_NEAR(left.left, right.left - 80, 1);
+}
+
+TEST_F(RenderTest, ColoursByStrainInOneScale) {
+  v1::Scene scene = standing_square();
+  const std::string still = record(scene, "still");
+  // the lowest row led down by a fifth of the spacing
+  v1::Sheet& sheet = *scene.mutable_sheets(0);
+  sheet.mutable_pins(0)->mutable_particles()->Truncate(20);
+  v1::Pin& led = *sheet.add_pins();
+  for (int i = 20; i < 25; ++i) led.add_particles(i);
+  led.add_path()->set_time_s(0);
+  v1::Keyframe& end = *led.add_path();
+  end.set_time_s(0.02);
+  end.mutable_offset_m()->set_y(-0.02);
+  const std::string stretched = record(scene, "stretched");
+
+  const nlohmann::json answer = ask({"render", still, stretched, "--colour", "strain", "--size",
+                                     "160x80", "--azimuth", "0", "--elevation", "0", "-o", png_});
+  EXPECT_NEAR(answer["largest_strain"], 0.2, 1e-4);
+  const Image image(png_);
+  EXPECT_EQ(find_front(image, 0, 80).pixels, 0);  // nothing red where nothing is stretched
+  EXPECT_GT(find_front(image, 80, 160).pixels, 75);
+  const Rgb blue = image.at(40, 30);
+  EXPECT_GT(blue.blue, blue.red + 60);
+}
+
+TEST_F(RenderTest, ShowsSeveralFramesAndTheSameBytesAgain) {
+  const std::string square = record(standing_square(), "square");
+  const auto answer = ask({"render", square, "--contact", "4", "--size", "128x128", "-o", png_});
+  EXPECT_EQ(answer["frames"], (nlohmann::json{{0, 1, 2, 3}}));
+  const std::string bytes = read_file(png_);
+  ask({"render", square, "--frame", "0,1,2,3", "--size", "128x128", "-o", png_});
+  EXPECT_EQ(read_file(png_), bytes);
+  const Image image(png_);
+  for (const int x : {32, 96})
+    for (const int y : {28, 92}) EXPECT_TRUE(image.at(x, y).is_front());
+}
+
+TEST_F(RenderTest, SaysWhatIsWrong) {
+  const std::string square = record(standing_square(), "square");
+  const auto refused = [&](std::vector<std::string> arguments, int exit) {
+    arguments.insert(arguments.begin(), {"render", square});
+    const Outcome outcome = weft(std::move(arguments));
+    EXPECT_EQ(outcome.exit, exit);
+    return outcome.err;
+  };
+  EXPECT_THAT(refused({"--frame", "2,4", "-o", png_}, 1), HasSubstr("no frame 4; it has 0 to 3"));
+  for (const std::string size : {"63x64", "64x8193", "64", "64x", "axb", "64x64x64"}) {
+    EXPECT_THAT(refused({"--size", size, "-o", png_}, 2),
+                HasSubstr("--size " + size + ": write WIDTHxHEIGHT, each 64 to 8192 pixels"));
+  }
+  EXPECT_THAT(refused({"--contact", "4", "--size", "127x128", "-o", png_}, 2),
+              HasSubstr("127 x 128 pixels are too few for 2 x 2 frames, of 64 x 64 each"));
+  EXPECT_THAT(refused({"--size", "64x64", "-o", path("no/x.png")}, 4),
+              HasSubstr("cannot write " + path("no/x.png") + ": No such file or directory"));
+  EXPECT_THAT(refused({"-o", square}, 4), HasSubstr("it is the recording itself"));
+  EXPECT_FALSE(std::filesystem::exists(png_));
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -9,11 +9,11 @@
 namespace weft::client {
 namespace {
 
-// Where a file is written until it is whole. Devices and pipes are written to at once.
+// Where a file is written until it is whole. Links, devices and pipes are written to at once.
 std::string unfinished_name(const std::string& path) {
   std::error_code error;
-  const bool other =
-      std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error);
+  const auto status = std::filesystem::symlink_status(path, error);
+  const bool other = std::filesystem::exists(status) && !std::filesystem::is_regular_file(status);
   return other ? path : path + ".part";
 }
 

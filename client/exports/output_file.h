@@ -14,7 +14,8 @@ std::string_view bytes_of(const std::vector<Number>& numbers) {
 }
 
 // A file that is written; what fails is a Problem. It has its name when it is closed, and until
-// then the name with ".part", under which it is removed if it is never closed.
+// then the name with ".part", under which it is removed if it is never closed. Links and devices
+// are written to at once.
 class OutputFile {
  public:
   explicit OutputFile(std::string path);

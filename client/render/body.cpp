@@ -15,7 +15,7 @@ Vector3d offset_at(const google::protobuf::RepeatedPtrField<v1::Keyframe>& path,
                                  [&](const v1::Keyframe& key) { return time_s < key.time_s(); });
   if (next == path.begin()) return vector_of(next->offset_m());
   const v1::Keyframe& before = *std::prev(next);
-  const Vector3d from = vector_of(before.offset_m());
+  Vector3d from = vector_of(before.offset_m());
   if (next == path.end()) return from;
   const double share = (time_s - before.time_s()) / (next->time_s() - before.time_s());
   return from + share * (vector_of(next->offset_m()) - from);

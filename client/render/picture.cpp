@@ -27,7 +27,7 @@ std::array<float, 3> bytes_of(const Colour& colour) {
   return bytes;
 }
 
-std::uint8_t rounded(float value) { return static_cast<std::uint8_t>(value + 0.5F); }
+std::uint8_t rounded(float value) { return static_cast<std::uint8_t>(std::lround(value)); }
 
 }  // namespace
 

@@ -36,6 +36,6 @@ struct Stage {
   double time_s = 0;
 };
 
-Stage read_stage(RecordingReader& recording, std::int64_t frame, Colouring colouring);
+Stage read_stage(RecordingReader& recording, std::int64_t number, Colouring colouring);
 
 }  // namespace weft::client

@@ -10,7 +10,7 @@
 
 namespace weft::client {
 
-// What all pictures of a sheet have in common.
+// What the frames in a picture have in common.
 struct Studio {
   Directions directions;
   Eigen::Vector3d centre;  // of what is shown, m

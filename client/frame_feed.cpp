@@ -48,7 +48,7 @@ std::optional<v1::StreamFramesResponse> FrameFeed::next() {
       continue;
     }
     const grpc::Status status = reader_->Finish();
-    const bool complete = header_seen_ && request_.has_end_frame() && request_.has_start_frame() &&
+    const bool complete = header_ && request_.has_end_frame() && request_.has_start_frame() &&
                           request_.start_frame() > request_.end_frame();
     if (status.ok() || complete || stop_.stop_requested()) return std::nullopt;
     open_again(status);
@@ -69,24 +69,23 @@ bool FrameFeed::note(const v1::StreamFramesResponse& message) {
   pause_ = kFirstPause;
   if (message.has_header()) {
     const std::string& numerics = message.header().numerics_id();
-    if (header_seen_ && numerics != numerics_id_) {
+    if (header_ && numerics != header_->numerics_id()) {
       throw Problem(Exit::kRefused, "FAILED_PRECONDITION", "NUMERICS_CHANGED",
                     fmt::format("the server went from numerics {} to {}: the frames to come do not "
                                 "continue those before to the bit",
-                                numerics_id_, numerics));
+                                header_->numerics_id(), numerics));
     }
-    numerics_id_ = numerics;
-    array_bytes_ = array_bytes(message.header());
+    particle_count(message.header());  // throws
     request_.set_uid(message.header().uid());
     if (!request_.has_start_frame()) request_.set_start_frame(message.header().start_frame());
-    return !std::exchange(header_seen_, true);
+    return !std::exchange(header_, message.header());
   }
-  if (!header_seen_) {
+  if (!header_) {
     throw Problem(Exit::kRefused, "INTERNAL", "HEADER_MISSING",
                   "the server sent something else before the header");
   }
   if (message.has_frame()) {
-    if (!is_whole(message.frame(), array_bytes_, request_.format().velocities())) {
+    if (!is_whole(message.frame(), *header_)) {
       throw Problem(Exit::kRefused, "INTERNAL", "FRAME_INCOMPLETE",
                     fmt::format("the server sent frame {}, but not as long as its header says",
                                 message.frame().number()));
@@ -103,7 +102,7 @@ bool FrameFeed::note(const v1::StreamFramesResponse& message) {
 
 void FrameFeed::open_again(const grpc::Status& status) {
   const bool hopeless =
-      came_from_weftd(status) || !header_seen_ || Clock::now() - last_heard_ > patience_;
+      came_from_weftd(status) || !header_ || Clock::now() - last_heard_ > patience_;
   if (hopeless) connection_.check(status);
   wait(pause_, stop_);
   connection_.await_server(kLongestPause);

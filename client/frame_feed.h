@@ -40,9 +40,7 @@ class FrameFeed {
   v1::StreamFramesRequest request_;
   std::chrono::seconds patience_;
   std::stop_token stop_;
-  bool header_seen_ = false;
-  std::string numerics_id_;      // of the header
-  std::size_t array_bytes_ = 0;  // of frames, as the header says
+  std::optional<v1::StreamHeader> header_;  // the latest
   int reconnections_ = 0;
   Clock::time_point last_heard_;
   std::chrono::milliseconds pause_{};

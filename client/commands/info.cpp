@@ -19,10 +19,20 @@ std::string sheets_text(const v1::StreamHeader& header) {
   return text;
 }
 
+std::string numbers_text(const v1::FrameFormat& format) {
+  switch (format.encoding()) {
+    case v1::FRAME_ENCODING_FLOAT64:
+      return "float64";
+    case v1::FRAME_ENCODING_QUANTIZED_ZSTD:
+      return fmt::format("quantized to {:g} mm", 1000 * format.grid_step_m());
+    default:
+      return "float32";
+  }
+}
+
 std::string facts_text(const RecordingReader& recording, const Inspection& inspection) {
   const v1::StreamHeader& header = recording.header();
   const Tally& tally = inspection.tally;
-  const bool doubles = header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
   Facts facts;
   facts.add("recording", recording.path())
       .add("recorded", recording.recorded_at())
@@ -32,7 +42,7 @@ std::string facts_text(const RecordingReader& recording, const Inspection& inspe
       .add("sheets", sheets_text(header))
       .add("content",
            fmt::format("positions{}, {}", header.format().velocities() ? ", velocities" : "",
-                       doubles ? "float64" : "float32"))
+                       numbers_text(header.format())))
       .add("frame step", seconds_text(header.frame_step_s()))
       .add("frames", tally.frames == 0 ? "none"
                                        : fmt::format("{} ({} to {})", tally.frames,

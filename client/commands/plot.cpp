@@ -57,7 +57,7 @@ void add_curves(Curves& curves, const std::string& path, const FrameRange& wante
   const std::int64_t last = std::min(wanted.last, recording.last_frame());
   for (auto n = std::max(wanted.first, recording.first_frame()); n <= last; ++n) {
     const v1::Frame frame = recording.read(n);
-    Points points = read_points(frame.positions_m(), recording.header().format().encoding());
+    Points points = read_points(frame.positions_m(), recording.header());
     const double time = frame.time_s();
     kinetic.points.emplace_back(time, frame.stats().kinetic_energy_j());
     potential.points.emplace_back(time, frame.stats().potential_energy_j());

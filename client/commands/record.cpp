@@ -72,8 +72,10 @@ void run_record(Context& context, const RecordOptions& options) {
 }  // namespace
 
 void add_record(CLI::App& app, Context& context) {
-  const std::map<std::string, v1::FrameEncoding> encodings{{"float32", v1::FRAME_ENCODING_FLOAT32},
-                                                           {"float64", v1::FRAME_ENCODING_FLOAT64}};
+  const std::map<std::string, v1::FrameEncoding> encodings{
+      {"float32", v1::FRAME_ENCODING_FLOAT32},
+      {"float64", v1::FRAME_ENCODING_FLOAT64},
+      {"quantized", v1::FRAME_ENCODING_QUANTIZED_ZSTD}};
   auto options = std::make_shared<RecordOptions>();
   RecordingOrder& order = options->order;
   CLI::App* command =
@@ -88,9 +90,11 @@ void add_record(CLI::App& app, Context& context) {
   command->add_flag("--run", order.run,
                     "Let the session run, as far as it is recorded (always with --embedded)");
   command->add_flag("--velocities", order.velocities, "Velocities too");
-  command->add_option("--encoding", order.encoding, "Numbers in the file [float32]")
+  command
+      ->add_option("--encoding", order.encoding,
+                   "Numbers in the file [float32]; quantized: within 0.05 mm")
       ->transform(CLI::CheckedTransformer(encodings))
-      ->option_text("float32|float64");
+      ->option_text("float32|float64|quantized");
   command
       ->add_option("--patience", options->patience_s,
                    "Seconds to try again after a connection broke")

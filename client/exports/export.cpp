@@ -104,10 +104,10 @@ ExportResult export_recording(RecordingReader& recording, const ExportOrder& ord
   ExportResult result{.frames = 0, .particles = static_cast<std::int64_t>(part.count)};
   for (const std::int64_t number : numbers) {
     const v1::Frame frame = recording.read(number);
-    writer->add({.number = frame.number(),
-                 .time_s = frame.time_s(),
-                 .points = read_points(frame.positions_m(), recording.header().format().encoding(),
-                                       part.first, part.count)});
+    writer->add(
+        {.number = frame.number(),
+         .time_s = frame.time_s(),
+         .points = read_points(frame.positions_m(), recording.header(), part.first, part.count)});
     ++result.frames;
     progress(result);
   }

@@ -46,7 +46,7 @@ std::size_t particles_of(const v1::StreamHeader& header) {
 }
 
 Points points_of(const RecordingReader& recording, const v1::Frame& frame) {
-  return read_points(frame.positions_m(), recording.header().format().encoding());
+  return read_points(frame.positions_m(), recording.header());
 }
 
 FrameRange frames_of(const RecordingReader& recording, const FrameRange& wanted) {

@@ -108,9 +108,8 @@ Comparison compare(RecordingReader& a, RecordingReader& b, const FrameRange& ran
   for (auto number = result.first_frame; number <= result.last_frame; ++number) {
     const v1::Frame left = a.read(number);
     const v1::Frame right = b.read(number);
-    const FrameDifference found =
-        difference(read_points(left.positions_m(), a.header().format().encoding()),
-                   read_points(right.positions_m(), b.header().format().encoding()));
+    const FrameDifference found = difference(read_points(left.positions_m(), a.header()),
+                                             read_points(right.positions_m(), b.header()));
     sum_of_squares += found.sum_of_squares;
     count += static_cast<double>(found.particles);
     if (found.largest > result.largest_m) {

@@ -14,7 +14,7 @@ namespace weft::client {
 namespace {
 
 bool is_finite(const v1::Frame& frame, const v1::StreamHeader& header) {
-  const Points points = read_points(frame.positions_m(), header.format().encoding());
+  const Points points = read_points(frame.positions_m(), header);
   const auto finite = [](double value) { return std::isfinite(value); };
   return std::all_of(points.x.begin(), points.x.end(), finite) &&
          std::all_of(points.y.begin(), points.y.end(), finite) &&

@@ -1,9 +1,13 @@
 #include "client/recording/points.h"
 
+#include <zstd.h>
+
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <optional>
 
 #include "client/problem.h"
 
@@ -29,16 +33,64 @@ Points read_planes(const std::string& planes, std::size_t first, std::size_t cou
           .z = read_plane<Number>(planes, 2, first, count)};
 }
 
+// The bytes in a packed array, where they are byte planes of so many numbers.
+std::optional<std::string> unpack(const std::string& array, std::size_t numbers) {
+  constexpr std::size_t kMostPlanes = 8;
+  const auto size = ZSTD_getFrameContentSize(array.data(), array.size());
+  if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR || size < numbers ||
+      size % numbers != 0 || size / numbers > kMostPlanes) {
+    return std::nullopt;
+  }
+  std::string bytes(size, '\0');
+  if (ZSTD_decompress(bytes.data(), size, array.data(), array.size()) != size) return std::nullopt;
+  return bytes;
+}
+
+// An array of FRAME_ENCODING_QUANTIZED_ZSTD in FRAME_ENCODING_FLOAT64.
+std::string as_doubles(const std::string& array, const v1::StreamHeader& header) {
+  const std::size_t particles = particle_count(header);
+  const std::string bytes = unpack(array, 3 * particles).value();
+  std::vector<std::uint64_t> numbers(3 * particles);
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    numbers[i % numbers.size()] |= std::uint64_t{static_cast<unsigned char>(bytes[i])}
+                                   << 8 * (i / numbers.size());
+  }
+  std::vector<double> values(numbers.size());
+  std::uint64_t steps = 0;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (i % particles == 0) steps = 0;
+    steps += numbers[i] >> 1 ^ -(numbers[i] & 1);
+    values[i] =
+        static_cast<double>(static_cast<std::int64_t>(steps)) * header.format().grid_step_m();
+  }
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double)};
+}
+
+bool is_whole(const std::string& array, const v1::FrameFormat& format, std::size_t particles) {
+  const std::size_t numbers = 3 * particles;
+  switch (format.encoding()) {
+    case v1::FRAME_ENCODING_FLOAT64:
+      return array.size() == numbers * sizeof(double);
+    case v1::FRAME_ENCODING_QUANTIZED_ZSTD:
+      return unpack(array, numbers).has_value();
+    default:
+      return array.size() == numbers * sizeof(float);
+  }
+}
+
 }  // namespace
 
-std::size_t array_bytes(const v1::StreamHeader& header) {
+std::size_t particle_count(const v1::StreamHeader& header) {
   constexpr std::int64_t kMostParticles = std::numeric_limits<std::int32_t>::max();
+  const v1::FrameFormat& format = header.format();
   std::int64_t particles = 0;
   // frames are counted from here
   constexpr std::int64_t kLastStart = std::int64_t{1} << 62;
   bool sound = header.start_frame() >= 0 && header.start_frame() <= kLastStart;
-  sound = sound && (header.format().encoding() == v1::FRAME_ENCODING_FLOAT32 ||
-                    header.format().encoding() == v1::FRAME_ENCODING_FLOAT64);
+  sound = sound && (format.encoding() == v1::FRAME_ENCODING_FLOAT32 ||
+                    format.encoding() == v1::FRAME_ENCODING_FLOAT64 ||
+                    (format.encoding() == v1::FRAME_ENCODING_QUANTIZED_ZSTD &&
+                     format.grid_step_m() > 0 && std::isfinite(format.grid_step_m())));
   for (const auto& sheet : header.sheets()) {
     sound = sound && sheet.rows() > 0 && sheet.columns() > 0 && sheet.first_particle() == particles;
     if (!sound) break;
@@ -49,25 +101,33 @@ std::size_t array_bytes(const v1::StreamHeader& header) {
     throw Problem(Exit::kRefused, "DATA_LOSS", "HEADER_UNREADABLE",
                   "the header names sheets, a format or a first frame that no stream has");
   }
-  const bool doubles = header.format().encoding() == v1::FRAME_ENCODING_FLOAT64;
-  return 3 * static_cast<std::size_t>(particles) * (doubles ? sizeof(double) : sizeof(float));
+  return static_cast<std::size_t>(particles);
 }
 
-bool is_whole(const v1::Frame& frame, std::size_t array_bytes, bool velocities) {
-  return frame.positions_m().size() == array_bytes &&
-         frame.velocities_m_per_s().size() == (velocities ? array_bytes : 0);
+bool is_whole(const v1::Frame& frame, const v1::StreamHeader& header) {
+  const std::size_t particles = particle_count(header);
+  const auto whole = [&](const std::string& array) {
+    return is_whole(array, header.format(), particles);
+  };
+  return whole(frame.positions_m()) &&
+         (header.format().velocities() ? whole(frame.velocities_m_per_s())
+                                       : frame.velocities_m_per_s().empty());
 }
 
-Points read_points(const std::string& planes, v1::FrameEncoding encoding, std::size_t first,
+Points read_points(const std::string& array, const v1::StreamHeader& header, std::size_t first,
                    std::size_t count) {
-  return encoding == v1::FRAME_ENCODING_FLOAT64 ? read_planes<double>(planes, first, count)
-                                                : read_planes<float>(planes, first, count);
+  switch (header.format().encoding()) {
+    case v1::FRAME_ENCODING_FLOAT64:
+      return read_planes<double>(array, first, count);
+    case v1::FRAME_ENCODING_QUANTIZED_ZSTD:
+      return read_planes<double>(as_doubles(array, header), first, count);
+    default:
+      return read_planes<float>(array, first, count);
+  }
 }
 
-Points read_points(const std::string& planes, v1::FrameEncoding encoding) {
-  const bool doubles = encoding == v1::FRAME_ENCODING_FLOAT64;
-  return read_points(planes, encoding, 0,
-                     planes.size() / (3 * (doubles ? sizeof(double) : sizeof(float))));
+Points read_points(const std::string& array, const v1::StreamHeader& header) {
+  return read_points(array, header, 0, particle_count(header));
 }
 
 }  // namespace weft::client

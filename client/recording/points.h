@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -12,17 +13,17 @@ struct Points {
   std::vector<double> x, y, z;
 };
 
-// Bytes of an array of the stream's frames. Throws where the header's sheets do not follow each
-// other as sheets do, or the format is unknown, or no frame has the number of the first.
-std::size_t array_bytes(const v1::StreamHeader& header);
+// Particles in the stream's frames. Throws where the header's sheets do not follow each other as
+// sheets do, or the format is unknown, or no frame has the number of the first.
+std::size_t particle_count(const v1::StreamHeader& header);
 
-// Whether the arrays of the frame are as long as they should be.
-bool is_whole(const v1::Frame& frame, std::size_t array_bytes, bool velocities);
+// Whether the arrays of the frame can be read and hold all particles.
+bool is_whole(const v1::Frame& frame, const v1::StreamHeader& header);
 
-// The particles first, first + 1, ... of the planes of a frame.
-Points read_points(const std::string& planes, v1::FrameEncoding encoding, std::size_t first,
+// The particles first, first + 1, ... of an array of a frame that is whole.
+Points read_points(const std::string& array, const v1::StreamHeader& header, std::size_t first,
                    std::size_t count);
 // All of them.
-Points read_points(const std::string& planes, v1::FrameEncoding encoding);
+Points read_points(const std::string& array, const v1::StreamHeader& header);
 
 }  // namespace weft::client

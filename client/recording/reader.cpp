@@ -40,7 +40,7 @@ RecordingReader::RecordingReader(const std::string& path)
     throw damaged(path, "the checksum of its number of frames is wrong");
   last_frame_ = extent.integer(0);
   try {
-    array_bytes_ = array_bytes(header_);
+    particle_count(header_);
   } catch (const Problem& problem) {
     throw damaged(path, problem.what());
   }
@@ -65,7 +65,7 @@ v1::Frame RecordingReader::read(std::int64_t number) {
                      frame.ParseFromString(bytes) && frame.number() == number &&
                      frame.time_s() == row.real(0);
   if (!sound) throw damaged(path_, fmt::format("the checksum of frame {} is wrong", number));
-  if (!is_whole(frame, array_bytes_, header_.format().velocities()))
+  if (!is_whole(frame, header_))
     throw damaged(path_, fmt::format("frame {} is not as long as its header says", number));
   return frame;
 }

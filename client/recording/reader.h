@@ -41,7 +41,6 @@ class RecordingReader {
   v1::StreamHeader header_;
   std::string recorded_at_;
   std::int64_t last_frame_ = 0;
-  std::size_t array_bytes_ = 0;  // of a frame's positions
 };
 
 }  // namespace weft::client

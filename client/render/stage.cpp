@@ -119,7 +119,7 @@ void keep_off(Points& points, const v1::SheetLayout& sheet, int pieces,
 }  // namespace
 
 Stage read_stage(RecordingReader& recording, std::int64_t number, Colouring colouring) {
-  const v1::FrameEncoding encoding = recording.header().format().encoding();
+  const v1::StreamHeader& header = recording.header();
   const v1::Frame frame = recording.read(number);
   v1::Frame before = frame;
   if (colouring == Colouring::kSpeed && number > recording.first_frame())
@@ -130,14 +130,14 @@ Stage read_stage(RecordingReader& recording, std::int64_t number, Colouring colo
   stage.frame = number;
   stage.time_s = frame.time_s();
   stage.bodies = bodies_at(recording.scene(), stage.time_s);
-  const int pieces = pieces_of(recording.header());
-  for (int i = 0; i < recording.header().sheets_size(); ++i) {
-    const v1::SheetLayout& layout = recording.header().sheets(i);
+  const int pieces = pieces_of(header);
+  for (int i = 0; i < header.sheets_size(); ++i) {
+    const v1::SheetLayout& layout = header.sheets(i);
     const v1::Sheet& sheet = recording.scene().sheets(i);
     const auto first = static_cast<std::size_t>(layout.first_particle());
     const std::size_t count =
         static_cast<std::size_t>(layout.rows()) * static_cast<std::size_t>(layout.columns());
-    const Points points = read_points(frame.positions_m(), encoding, first, count);
+    const Points points = read_points(frame.positions_m(), header, first, count);
     for (std::size_t k = 0; k < count; ++k) {
       if (!std::isfinite(points.x[k] + points.y[k] + points.z[k]))
         throw damaged(recording.path(),
@@ -147,7 +147,7 @@ Stage read_stage(RecordingReader& recording, std::int64_t number, Colouring colo
     std::vector<double> values(count);
     if (colouring == Colouring::kStrain) values = strains_of(layout, points, spacing_m);
     if (colouring == Colouring::kSpeed && step_s > 0) {
-      const Points others = read_points(before.positions_m(), encoding, first, count);
+      const Points others = read_points(before.positions_m(), header, first, count);
       for (std::size_t k = 0; k < count; ++k) values[k] = distance(points, k, others, k) / step_s;
     }
 

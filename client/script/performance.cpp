@@ -34,8 +34,8 @@ double position(const Sight& sight, const Expectation& expectation) {
     if (!expectation.sheet.empty() && sheet.name() != expectation.sheet) continue;
     const int particle =
         sheet.first_particle() + expectation.row * sheet.columns() + expectation.column;
-    const Points point = read_points(sight.frame.positions_m(), sight.header.format().encoding(),
-                                     static_cast<std::size_t>(particle), 1);
+    const Points point =
+        read_points(sight.frame.positions_m(), sight.header, static_cast<std::size_t>(particle), 1);
     return (expectation.axis == 0 ? point.x : expectation.axis == 1 ? point.y : point.z)[0];
   }
   return std::numeric_limits<double>::quiet_NaN();

@@ -1,10 +1,17 @@
 #include "server/rpc/frame_encoding.h"
 
+#include <zstd.h>
+
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <memory>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "core/model/text.h"
 
 namespace weft {
 namespace {
@@ -21,7 +28,47 @@ std::string planes_of(const std::vector<double>& values) {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)};
 }
 
+// The lowest byte of all numbers, then the next, as far as there are others than 0.
+std::string byte_planes(const std::vector<std::uint64_t>& numbers) {
+  std::uint64_t all = 0;
+  for (const std::uint64_t number : numbers) all |= number;
+  const auto bits = std::max<std::size_t>(1, std::bit_width(all));
+  std::string planes((bits + 7) / 8 * numbers.size(), '\0');
+  char* to = planes.data();
+  for (std::size_t shift = 0; shift < bits; shift += 8) {
+    for (const std::uint64_t number : numbers) *to++ = static_cast<char>(number >> shift);
+  }
+  return planes;
+}
+
+// Differences of neighbours on the grid; small ones of either sign are small numbers. The guard
+// keeps every value below 1e9, so that no sum leaves 64 bits.
+std::vector<std::uint64_t> quantized(const std::vector<double>& values, double step) {
+  std::vector<std::uint64_t> numbers(values.size());
+  std::int64_t before = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (i % (values.size() / 3) == 0) before = 0;
+    const std::int64_t steps = std::llround(values[i] / step);
+    const std::int64_t difference = steps - std::exchange(before, steps);
+    numbers[i] =
+        static_cast<std::uint64_t>(difference) << 1 ^ static_cast<std::uint64_t>(difference >> 63);
+  }
+  return numbers;
+}
+
+std::string compressed(const std::string& bytes) {
+  std::string result(ZSTD_compressBound(bytes.size()), '\0');
+  const std::size_t size =
+      ZSTD_compress(result.data(), result.size(), bytes.data(), bytes.size(), 1);
+  if (ZSTD_isError(size) != 0) throw std::bad_alloc();
+  result.resize(size);
+  return result;
+}
+
 std::string planes(const std::vector<double>& values, const v1::FrameFormat& format) {
+  if (format.encoding() == v1::FRAME_ENCODING_QUANTIZED_ZSTD) {
+    return compressed(byte_planes(quantized(values, format.grid_step_m())));
+  }
   return format.encoding() == v1::FRAME_ENCODING_FLOAT64 ? planes_of<double>(values)
                                                          : planes_of<float>(values);
 }
@@ -61,19 +108,43 @@ v1::FrameFormat with_defaults(v1::FrameFormat format) {
   if (format.encoding() == v1::FRAME_ENCODING_UNSPECIFIED) {
     format.set_encoding(v1::FRAME_ENCODING_FLOAT32);
   }
+  if (format.encoding() != v1::FRAME_ENCODING_QUANTIZED_ZSTD) {
+    format.clear_grid_step_m();
+  } else if (!format.has_grid_step_m()) {
+    format.set_grid_step_m(1e-4);
+  }
   return format;
 }
 
 std::int64_t frame_bytes(const v1::FrameFormat& format, std::int64_t particles) {
   constexpr std::int64_t kRest = 256;  // number, time, stats, tags and lengths
-  return kRest + particles * 3 * static_cast<std::int64_t>(value_bytes(format)) *
-                     (format.velocities() ? 2 : 1);
+  std::size_t bytes = static_cast<std::size_t>(particles) * 3 * value_bytes(format);
+  if (format.encoding() == v1::FRAME_ENCODING_QUANTIZED_ZSTD) bytes = ZSTD_compressBound(bytes);
+  return kRest + static_cast<std::int64_t>(bytes) * (format.velocities() ? 2 : 1);
+}
+
+std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t particles,
+                                   std::int64_t most_bytes) {
+  std::vector<Problem> problems;
+  if (!v1::FrameEncoding_IsValid(format.encoding())) {
+    problems.push_back(
+        {"format.encoding", std::to_string(format.encoding()) + " is no weft.v1.FrameEncoding"});
+  }
+  const double step = format.grid_step_m();
+  if (format.has_grid_step_m() && !(step >= 1e-5 && step <= 0.1)) {  // NaN too
+    problems.push_back({"format.grid_step_m", join(step, " m is not within 1e-05 to 0.1 m")});
+  }
+  const std::int64_t bytes = frame_bytes(format, particles);
+  if (bytes > most_bytes) {
+    problems.push_back({"format", "a frame of " + std::to_string(particles) + " particles takes " +
+                                      std::to_string(bytes) + " bytes in this format; at most " +
+                                      std::to_string(most_bytes) + " are sent"});
+  }
+  return problems;
 }
 
 grpc::ByteBuffer encoded_frame(const Frame& frame, const v1::FrameFormat& format) {
-  const int key = static_cast<int>(format.encoding()) * 4 + (format.velocities() ? 2 : 0) +
-                  (format.stats() ? 1 : 0);
-  const auto encoding = frame.encodings.get(key, [&] {
+  const auto encoding = frame.encodings.get(format.SerializeAsString(), [&] {
     auto buffer = std::make_shared<const grpc::ByteBuffer>(encoded(message_of(frame, format)));
     return Encoding{buffer, buffer->Length()};
   });

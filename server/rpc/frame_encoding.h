@@ -1,9 +1,12 @@
 #pragma once
 
+#include <grpcpp/impl/codegen/proto_utils.h>
 #include <grpcpp/support/byte_buffer.h>
 
 #include <cstdint>
+#include <vector>
 
+#include "core/simulation.h"
 #include "server/session/frame.h"
 #include "weft/v1/frame.pb.h"
 
@@ -12,13 +15,25 @@ namespace weft {
 // The format with defaults filled in.
 v1::FrameFormat with_defaults(v1::FrameFormat format);
 
-// Bytes of a message with a frame of so many particles, at most.
+// Bytes of a message with a frame of so many particles, at most. Of QUANTIZED_ZSTD: as long as no
+// two neighbours are 2^31 grid steps apart.
 std::int64_t frame_bytes(const v1::FrameFormat& format, std::int64_t particles);
+
+// Why frames of so many particles are not sent in the format, each within `most_bytes`.
+std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t particles,
+                                   std::int64_t most_bytes);
 
 // The message with this frame; its bytes are made once and shared by all who ask.
 grpc::ByteBuffer encoded_frame(const Frame& frame, const v1::FrameFormat& format);
 
 // Any other message.
 grpc::ByteBuffer encoded(const v1::StreamFramesResponse& message);
+
+// False where the bytes are no such message.
+template <class Message>
+bool decode(const grpc::ByteBuffer& bytes, Message& message) {
+  grpc::ByteBuffer read(bytes);
+  return grpc::SerializationTraits<Message>::Deserialize(&read, &message).ok();
+}
 
 }  // namespace weft

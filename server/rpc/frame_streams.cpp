@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "server/rpc/errors.h"
-#include "server/rpc/frame_stream.h"
+#include "server/rpc/frame_call.h"
 
 namespace weft {
 
@@ -14,7 +14,7 @@ FrameStreams::FrameStreams(std::size_t max_streams, Stats& stats)
 
 FrameStreams::~FrameStreams() = default;
 
-grpc::Status FrameStreams::add(std::shared_ptr<FrameStream> stream) {
+grpc::Status FrameStreams::add(std::shared_ptr<FrameCall> stream) {
   std::lock_guard lock(mutex_);
   if (draining_) return errors::server_draining();
   if (streams_.size() >= max_streams_) {
@@ -28,13 +28,13 @@ grpc::Status FrameStreams::add(std::shared_ptr<FrameStream> stream) {
   return grpc::Status::OK;
 }
 
-void FrameStreams::remove(const std::shared_ptr<FrameStream>& stream) {
+void FrameStreams::remove(const std::shared_ptr<FrameCall>& stream) {
   std::lock_guard lock(mutex_);
   stats_.streams -= static_cast<std::int64_t>(streams_.erase(stream));
 }
 
 void FrameStreams::drain() {
-  std::set<std::shared_ptr<FrameStream>> streams;
+  std::set<std::shared_ptr<FrameCall>> streams;
   {
     std::lock_guard lock(mutex_);
     draining_ = true;

@@ -14,9 +14,10 @@
 
 namespace weft {
 
-class FrameStream;
+class FrameCall;
 
-// The open streams, at most `max_streams`. A thread of its own reminds them of Progress.
+// The open calls that send frames, at most `max_streams`. A thread of its own reminds them of
+// Progress.
 class FrameStreams {
  public:
   // With kTick later a reader hears something every two seconds.
@@ -27,8 +28,8 @@ class FrameStreams {
   ~FrameStreams();
 
   // Why the stream is not one of them.
-  grpc::Status add(std::shared_ptr<FrameStream> stream);
-  void remove(const std::shared_ptr<FrameStream>& stream);
+  grpc::Status add(std::shared_ptr<FrameCall> stream);
+  void remove(const std::shared_ptr<FrameCall>& stream);
 
   // Ends every stream, and adds none any more.
   void drain();
@@ -40,7 +41,7 @@ class FrameStreams {
   Stats& stats_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::set<std::shared_ptr<FrameStream>> streams_;
+  std::set<std::shared_ptr<FrameCall>> streams_;
   bool draining_ = false;
   std::jthread thread_;
 };

@@ -4,7 +4,7 @@
 
 namespace weft {
 
-std::shared_ptr<const void> EncodingCache::get(int key,
+std::shared_ptr<const void> EncodingCache::get(const std::string& key,
                                                const std::function<Encoding()>& make) const {
   std::lock_guard lock(mutex_);
   if (const auto found = encodings_.find(key); found != encodings_.end()) return found->second;

@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "core/simulation.h"
@@ -26,14 +27,15 @@ using ByteMeter = std::shared_ptr<std::atomic<std::size_t>>;
 class EncodingCache {
  public:
   // The encoding of `key`, made by the first who asks; whoever asks meanwhile waits for it.
-  std::shared_ptr<const void> get(int key, const std::function<Encoding()>& make) const;
+  std::shared_ptr<const void> get(const std::string& key,
+                                  const std::function<Encoding()>& make) const;
 
   // Counts the bytes of every encoding, those to come too, in `meter`; nullptr: nowhere any more.
   void count_in(ByteMeter meter) const;
 
  private:
   mutable std::mutex mutex_;
-  mutable std::map<int, std::shared_ptr<const void>> encodings_;
+  mutable std::map<std::string, std::shared_ptr<const void>> encodings_;
   mutable std::size_t bytes_ = 0;
   mutable ByteMeter meter_;
 };

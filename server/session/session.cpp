@@ -695,7 +695,7 @@ std::shared_ptr<const Frame> Session::make_frame(std::vector<Repair> repairs) co
 
 // Whether the frames to come are all like the last one, without a goal and with nobody to see them.
 bool Session::unattended() const {
-  return simulation_.asleep() && subscriptions_.empty() && !steps_begun() && !run_->until_frame &&
+  return simulation_.asleep() && !is_recorded() && !steps_begun() && !run_->until_frame &&
          Clock::now() > attended_ + kAttention;
 }
 
@@ -732,9 +732,15 @@ Reach Session::reach_to(std::int64_t frame) {
   return reach;
 }
 
-// Whether there are subscribers, or some that may come back.
+// Whether there are subscribers that want every frame.
+bool Session::is_recorded() const {
+  return std::any_of(subscriptions_.begin(), subscriptions_.end(),
+                     [](const auto* each) { return each->policy_ != SlowReader::kSkip; });
+}
+
+// Whether there are such, or some that may come back.
 bool Session::has_readers() const {
-  return !subscriptions_.empty() || past_holders_ || Clock::now() < readers_until_;
+  return is_recorded() || past_holders_ || Clock::now() < readers_until_;
 }
 
 // How far frames may be published once the event is in the log.

@@ -197,6 +197,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Reach reach_to(std::int64_t frame);
   std::int64_t reach_after(const Event& event) const;
   bool reach_suffices();
+  bool is_recorded() const;
   bool has_readers() const;
   std::int64_t first_held_frame();
   Progress progress() const;
@@ -209,7 +210,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::optional<Outcome> settle(const Step& step) const;
 
   // of subscriptions
-  Reading read(Subscription& subscription);
+  Reading read(Subscription& subscription, bool frame_wanted);
   void unsubscribe(const Subscription& subscription);
   bool release();  // with the mutex held
   void offer_to_all();

@@ -12,7 +12,7 @@ Subscription::Subscription(std::shared_ptr<Session> session, std::weak_ptr<Frame
 
 Subscription::~Subscription() { session_->unsubscribe(*this); }
 
-Reading Subscription::read() { return session_->read(*this); }
+Reading Subscription::read(bool frame_wanted) { return session_->read(*this, frame_wanted); }
 
 std::int64_t Subscription::next_frame() const {
   std::lock_guard lock(session_->mutex_);
@@ -43,21 +43,27 @@ void Session::unsubscribe(const Subscription& subscription) {
   {
     std::lock_guard lock(mutex_);
     std::erase(subscriptions_, &subscription);
-    attended_ = Clock::now();
+    if (subscription.policy_ != SlowReader::kSkip) attended_ = Clock::now();
     release();
   }
   wake();
 }
 
-Reading Session::read(Subscription& subscription) {
+Reading Session::read(Subscription& subscription, bool frame_wanted) {
   Reading reading;
   {
     std::lock_guard lock(mutex_);
     reading.progress = progress();
-    reading.frame = history_.find(subscription.next_);
     if (closed_ == Refusal::Why::kDeleted) {
       reading.kind = Reading::Kind::kDeleted;
-    } else if (reading.frame) {
+      return reading;
+    }
+    if (!frame_wanted && subscription.next_ <= latest()) return reading;
+    if (subscription.policy_ == SlowReader::kSkip && subscription.next_ < latest()) {
+      reading.skipped = latest() - std::exchange(subscription.next_, latest());
+    }
+    reading.frame = history_.find(subscription.next_);
+    if (reading.frame) {
       reading.kind = Reading::Kind::kFrame;
       ++subscription.next_;
     } else if (subscription.next_ < history_.oldest()) {

@@ -11,9 +11,10 @@ class Session;
 
 enum class SessionState { kRestoring, kPaused, kRunning, kFailed };
 
-// What happens when a subscriber falls behind the frames that are kept: its subscription expires,
-// or the session waits for it.
-enum class SlowReader { kDisconnect, kHoldSession };
+// What happens when a subscriber falls behind: its subscription expires with the frames that are
+// kept, the session waits for it, or it goes on with the newest frame. The last only looks: for it
+// alone a session that sleeps does not go on, nor are frames computed again after a restart.
+enum class SlowReader { kDisconnect, kHoldSession, kSkip };
 
 // Someone who wants to know when there is something new. `offer` never blocks; it is called from
 // any thread with no lock held, and may be called for nothing.
@@ -43,6 +44,7 @@ struct Reading {
   };
   Kind kind = Kind::kNothingYet;
   std::shared_ptr<const Frame> frame;  // of kFrame
+  std::int64_t skipped = 0;            // frames left out before it
   Progress progress;
 };
 
@@ -56,8 +58,9 @@ class Subscription {
   Subscription(const Subscription&) = delete;
   Subscription& operator=(const Subscription&) = delete;
 
-  // The next frame, each once and in order, or why there is none.
-  Reading read();
+  // The next frame, each once and in order, or why there is none; with kSkip the newest. Where no
+  // frame is wanted, only whether there will be more.
+  Reading read(bool frame_wanted = true);
 
   std::int64_t next_frame() const;
   Progress progress() const;

@@ -113,9 +113,8 @@ TEST_F(PageTest, HoldsEveryPositionWithinTheErrorItStates) {
     ASSERT_EQ(decoded.size(), kEnd + 1);
     client::RecordingReader recording(index == 0 ? hung_ : fallen_);
     for (std::size_t frame = 0; frame < decoded.size(); ++frame) {
-      const auto recorded =
-          client::read_points(recording.read(static_cast<std::int64_t>(frame)).positions_m(),
-                              recording.header().format().encoding());
+      const auto recorded = client::read_points(
+          recording.read(static_cast<std::int64_t>(frame)).positions_m(), recording.header());
       for (std::size_t i = 0; i < recorded.x.size(); ++i) {
         ASSERT_NEAR(decoded[frame][3 * i], recorded.x[i], bound + 1e-12);
         ASSERT_NEAR(decoded[frame][3 * i + 1], recorded.y[i], bound + 1e-12);

@@ -2,12 +2,14 @@
 #include <signal.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <thread>
 
 #include "client/problem.h"
+#include "client/recording/points.h"
 #include "client/recording/reader.h"
 #include "tests/client/breaking_proxy.h"
 #include "tests/client/client_test.h"
@@ -67,6 +69,26 @@ TEST_F(RecordingTest, HoldsVelocitiesWhereAsked) {
   const auto frames = recorded(file_);
   ASSERT_EQ(frames.size(), 4);
   EXPECT_EQ(frames.back().velocities_m_per_s().size(), 20 * 3 * sizeof(float));
+}
+
+TEST_F(RecordingTest, HoldsQuantizedFramesWithinHalfAStep) {
+  v1::Scene far = small_scene();
+  *far.add_sheets() = far.sheets(0);
+  far.mutable_sheets(1)->mutable_placement()->mutable_origin_m()->set_x(-9000);
+  service_.create(far, "far");
+  const std::string exact = path("exact.weft");
+  ask({"record", "far", "--run", "--to", "20", "--encoding", "float64", "--velocities", "-o",
+       exact});
+  ask({"record", "far", "--from", "0", "--to", "20", "--encoding", "quantized", "--velocities",
+       "-o", file_});
+  EXPECT_LE(ask({"diff", exact, file_})["largest_m"], std::sqrt(3) * 0.5e-4 * (1 + 1e-6));
+  EXPECT_THAT(weft({"info", file_}).out, HasSubstr("positions, velocities, quantized to 0.1 mm"));
+  ask({"verify", file_});
+  ask({"export", file_, "--format", "pc2", "-o", path("far.pc2")});
+  RecordingReader reader(file_), truth(exact);
+  const auto found = client::read_points(reader.read(9).velocities_m_per_s(), reader.header());
+  const auto wanted = client::read_points(truth.read(9).velocities_m_per_s(), truth.header());
+  for (std::size_t i = 0; i < wanted.y.size(); ++i) ASSERT_NEAR(found.y[i], wanted.y[i], 0.5e-4);
 }
 
 TEST_F(RecordingTest, EndsAtRest) {

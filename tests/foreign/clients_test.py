@@ -12,6 +12,7 @@ import tempfile
 import unittest
 
 import grpc
+import zstd
 from google.protobuf import descriptor_pb2, descriptor_pool, json_format, message_factory
 
 DOMAIN = "weft.v1"
@@ -217,6 +218,30 @@ class Weftd(unittest.TestCase):
         info = self.weft.call("weft.v1.ServerService.GetServerInfo")
         self.assertGreater(info.limits.max_sessions, 0)
         self.assertGreater(self.weft.call("weft.v1.ServerService.GetServerStats").uptime_s, 0)
+
+    def test_quantized_positions_can_be_unpacked_as_the_manual_says(self):
+        name = self.create("packed").name
+        self.weft.call("weft.v1.SessionService.StepSession", name=name, frames=9)
+        frames = lambda **format: [message.frame for message in self.weft.call(
+            "weft.v1.FrameService.StreamFrames", session=name, startFrame=9, endFrame=9,
+            format=format) if message.HasField("frame")]
+        exact = array.array("d", frames(encoding="FRAME_ENCODING_FLOAT64")[0].positions_m)
+        packed = frames(encoding="FRAME_ENCODING_QUANTIZED_ZSTD", gridStepM=0.001)[0].positions_m
+        planes = zstd.decompress(packed)
+        values = len(exact)
+        self.assertEqual(len(planes) % values, 0)
+        steps = 0
+        for i in range(values):
+            number = int.from_bytes(planes[i::values], "little")
+            difference = number >> 1 ^ -(number & 1)
+            steps = difference if i % (values // 3) == 0 else steps + difference
+            self.assertLessEqual(abs(steps * 0.001 - exact[i]), 0.0005 + 1e-12)
+
+    def test_a_view_shows_the_newest_frame(self):
+        name = self.create("seen").name
+        self.weft.call("weft.v1.SessionService.StepSession", name=name, frames=9)
+        header, shown = self.weft.call("weft.v1.FrameService.ViewFrames", session=name, credits=1)
+        self.assertEqual((header.header.start_frame, shown.frame.number), (9, 9))
 
     def test_the_readme_s_reader_prints_every_frame(self):
         reader = pathlib.Path(__file__).parent / "read_frames.py"

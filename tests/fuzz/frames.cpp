@@ -1,4 +1,5 @@
 #include <fuzzer/FuzzedDataProvider.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -28,7 +29,9 @@ StreamHeader some_header(FuzzedDataProvider& input) {
   if (is_wild(input)) header.set_start_frame(input.ConsumeIntegral<std::int64_t>());
   header.set_frame_step_s(is_wild(input) ? input.ConsumeFloatingPoint<double>() : 1.0 / 60);
   header.mutable_format()->set_encoding(static_cast<weft::v1::FrameEncoding>(
-      is_wild(input) ? input.ConsumeIntegral<int>() : input.ConsumeIntegralInRange(1, 2)));
+      is_wild(input) ? input.ConsumeIntegral<int>() : input.ConsumeIntegralInRange(1, 3)));
+  header.mutable_format()->set_grid_step_m(is_wild(input) ? input.ConsumeFloatingPoint<double>()
+                                                          : 1e-4);
   header.mutable_format()->set_velocities(input.ConsumeBool());
   std::uint32_t particles = 0;
   for (int sheets = input.ConsumeIntegralInRange(0, 3); sheets > 0; --sheets) {
@@ -52,7 +55,11 @@ std::string some_array(FuzzedDataProvider& input, const StreamHeader& header) {
   const bool doubles = header.format().encoding() == weft::v1::FRAME_ENCODING_FLOAT64;
   std::string bytes = input.ConsumeRandomLengthString();
   if (!is_wild(input)) bytes.resize(std::min<std::size_t>(values, 1000) * (doubles ? 8 : 4));
-  return bytes;
+  if (header.format().encoding() != weft::v1::FRAME_ENCODING_QUANTIZED_ZSTD || is_wild(input))
+    return bytes;
+  std::string packed(ZSTD_compressBound(bytes.size()), '\0');
+  packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 1));
+  return packed;
 }
 
 }  // namespace
@@ -63,7 +70,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   FuzzedDataProvider input(data, size);
   StreamHeader header;
   if (!header.ParseFromString(some_header(input).SerializeAsString())) return 0;  // not UTF-8
-  weft::client::array_bytes(header);  // whoever takes frames in asks this first
+  weft::client::particle_count(header);  // whoever takes frames in asks this first
   {
     weft::client::RecordingWriter writer(scratch.file(), true, {}, header);
     for (int count = 0; input.remaining_bytes() > 0; ++count) {

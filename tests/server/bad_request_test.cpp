@@ -373,7 +373,10 @@ std::vector<std::string> known_requests(const std::string& type) {
       {"StreamFramesRequest",
        "session: 'sessions/it' start_frame: 0 end_frame: 0 format { encoding: "
        "FRAME_ENCODING_FLOAT64 "
-       "velocities: true stats: true } slow_reader: SLOW_READER_HOLD_SESSION"},
+       "velocities: true stats: true grid_step_m: 0.001 } slow_reader: SLOW_READER_HOLD_SESSION"},
+      {"ViewFramesRequest",
+       "session: 'sessions/it' format { encoding: FRAME_ENCODING_QUANTIZED_ZSTD velocities: true "
+       "stats: true grid_step_m: 0.001 } credits: 2"},
       {"GetTextileRequest", "name: 'textiles/denim_11oz'"},
       {"RunTestRequest",
        "test: LAB_TEST_BENDING textile { measured { areal_density_kg_per_m2: 0.2 "
@@ -457,7 +460,7 @@ class Subject {
   static bool reads_only(const MethodDescriptor& method) {
     const std::string& name = method.name();
     return name.starts_with("Get") || name.starts_with("List") || name == "StreamFrames" ||
-           name == "RunTest";
+           name == "ViewFrames" || name == "RunTest";
   }
 
   // As it was at first, whatever was changed.
@@ -497,8 +500,8 @@ std::vector<const MethodDescriptor*> methods() {
         v1::Textile::descriptor()->file()}) {
     for (int i = 0; i < file->service_count(); ++i) {
       for (int k = 0; k < file->service(i)->method_count(); ++k) {
-        // gRPC shows a stream that cannot be decoded as one that has ended
-        if (file->service(i)->method(k)->client_streaming()) continue;
+        // gRPC shows messages that it cannot decode as the end of the stream
+        if (file->service(i)->method(k)->name() == "Interact") continue;
         methods.push_back(file->service(i)->method(k));
       }
     }

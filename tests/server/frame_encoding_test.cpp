@@ -40,12 +40,14 @@ TEST(FrameEncoding, IsMadeOnceForAllWatchersOfAFormat) {
 
 TEST(FrameEncoding, TakesNoMoreBytesThanIsSaid) {
   const auto frame = frame_of_100();
-  for (const auto encoding : {v1::FRAME_ENCODING_FLOAT32, v1::FRAME_ENCODING_FLOAT64}) {
+  for (const auto encoding : {v1::FRAME_ENCODING_FLOAT32, v1::FRAME_ENCODING_FLOAT64,
+                              v1::FRAME_ENCODING_QUANTIZED_ZSTD}) {
     for (const bool velocities : {false, true}) {
       v1::FrameFormat format;
       format.set_encoding(encoding);
       format.set_velocities(velocities);
       format.set_stats(true);
+      format = with_defaults(format);
       EXPECT_LE(encoded_frame(*frame, format).Length(),
                 static_cast<std::size_t>(frame_bytes(format, 100)));
     }

@@ -269,7 +269,7 @@ TEST(StreamFrames, RefusesRequestsThatMakeNoSense) {
   auto request = frames_of(session);
   request.mutable_format()->set_encoding(static_cast<v1::FrameEncoding>(9));
   request.set_slow_reader(static_cast<v1::SlowReader>(9));
-  EXPECT_THAT(fields_of(request), ElementsAre("format.encoding", "slow_reader"));
+  EXPECT_THAT(fields_of(request), ElementsAre("slow_reader", "format.encoding"));
   request = frames_of(session);
   request.set_session("x");
   EXPECT_THAT(fields_of(request), ElementsAre("session"));

@@ -25,6 +25,7 @@ constexpr std::array kTests{
     Test{"fan-out", weft::stress::fan_out},
     Test{"churn", weft::stress::churn},
     Test{"slow-readers", weft::stress::slow_readers},
+    Test{"view-age", weft::stress::view_age},
     Test{"kill", weft::stress::kills},
     Test{"drain", weft::stress::drain},
 };

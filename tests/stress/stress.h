@@ -20,6 +20,7 @@ Outcome real_time(Form form);
 Outcome fan_out(Form form);
 Outcome churn(Form form);
 Outcome slow_readers(Form form);
+Outcome view_age(Form form);
 Outcome kills(Form form);
 Outcome drain(Form form);
 

@@ -46,7 +46,7 @@ TEST(History, CountsTheEncodingsOfItsFrames) {
   History history(5 * kFrameBytes);
   for (int i = 0; i < 5; ++i) history.push(frame(i), kKeepNone);
   EXPECT_EQ(history.oldest(), 0);
-  history.latest()->encodings.get(0, [] {
+  history.latest()->encodings.get("0", [] {
     return Encoding{std::make_shared<int>(1), 2 * kFrameBytes};
   });
   history.push(frame(5), kKeepNone);
@@ -62,10 +62,10 @@ TEST(EncodingCache, MakesEachEncodingOnceAndLetsItGoWithTheFrame) {
       ++calls;
       return Encoding{std::make_shared<int>(calls), 4};
     };
-    const auto one = made->encodings.get(7, make);
-    EXPECT_EQ(made->encodings.get(7, make), one);
+    const auto one = made->encodings.get("7", make);
+    EXPECT_EQ(made->encodings.get("7", make), one);
     EXPECT_EQ(calls, 1);
-    EXPECT_NE(made->encodings.get(8, make), one);
+    EXPECT_NE(made->encodings.get("8", make), one);
     held = one;
   }
   EXPECT_TRUE(held.expired());

@@ -77,6 +77,8 @@ TEST(Session, AsleepWithoutGoalAndUnattendedTakesNoTurn) {
   while (!is_idle(scheduler, *session)) {
   }
   EXPECT_TRUE(is_idle(scheduler, *session));
+  const auto viewer = Watcher::of(*session, {}, SlowReader::kSkip);
+  EXPECT_TRUE(is_idle(scheduler, *session)) << "it goes on for one who looks and records nothing";
   EXPECT_EQ(session->status().state, SessionState::kRunning);
 }
 

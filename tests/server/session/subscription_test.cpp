@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <thread>
 
 #include "tests/server/session/session_support.h"
@@ -105,6 +106,21 @@ TEST(Subscription, OfADeletedSessionEnds) {
   EXPECT_EQ(watcher->read().kind, Reading::Kind::kDeleted);
 }
 
+TEST(Subscription, OneThatSkipsGetsTheNewestFrameWhateverIsKept) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler, hung_scene(), history_of(5));
+  const auto watcher = Watcher::of(*session, {}, SlowReader::kSkip);
+  EXPECT_EQ(watcher->read().frame->number, 0);
+  EXPECT_EQ(watcher->subscription().read().kind, Reading::Kind::kNothingYet);
+  step(*session, 20).applied();
+  EXPECT_EQ(watcher->subscription().read(false).kind, Reading::Kind::kNothingYet);
+  const Reading reading = watcher->read();
+  EXPECT_EQ(reading.frame->number, 20);
+  EXPECT_EQ(reading.skipped, 19);
+  session->close(Refusal::Why::kDeleted);
+  EXPECT_EQ(watcher->subscription().read(false).kind, Reading::Kind::kDeleted);
+}
+
 TEST(Subscription, ManyComeAndGoWhileTheSessionRuns) {
   Scheduler scheduler(2);
   const auto session = make_session(scheduler, hung_scene(), history_of(50));
@@ -114,15 +130,16 @@ TEST(Subscription, ManyComeAndGoWhileTheSessionRuns) {
   for (int i = 0; i < 6; ++i) {
     threads.emplace_back([&, i] {
       for (int k = 0; k < 20; ++k) {
-        const auto policy = i % 2 == 0 ? SlowReader::kHoldSession : SlowReader::kDisconnect;
+        const auto policy = std::array{SlowReader::kHoldSession, SlowReader::kDisconnect,
+                                       SlowReader::kSkip}[static_cast<std::size_t>(i) % 3];
         const auto watcher = Watcher::of(*session, {}, policy);
         std::int64_t last = -1;
         for (int n = 0; n < 5; ++n) {
           const Reading reading = watcher->read();
-          if (reading.kind == Reading::Kind::kExpired && i % 2 != 0) break;
+          if (reading.kind == Reading::Kind::kExpired && i % 3 == 1) break;
           ASSERT_EQ(reading.kind, Reading::Kind::kFrame);
           if (last >= 0) {
-            ASSERT_EQ(reading.frame->number, last + 1);
+            ASSERT_EQ(reading.frame->number, last + 1 + reading.skipped);
           }
           last = reading.frame->number;
         }

@@ -1,0 +1,162 @@
+#include "server/rpc/frame_call.h"
+
+#include <utility>
+
+#include "server/rpc/convert.h"
+#include "server/rpc/errors.h"
+#include "server/rpc/frame_encoding.h"
+#include "server/rpc/frame_streams.h"
+#include "server/rpc/names.h"
+#include "server/rpc/server_service.h"
+
+namespace weft {
+
+// what both calls send is encoded once
+using Streamed = v1::StreamFramesResponse;
+using Viewed = v1::ViewFramesResponse;
+static_assert(int{Viewed::kHeaderFieldNumber} == int{Streamed::kHeaderFieldNumber} &&
+              int{Viewed::kFrameFieldNumber} == int{Streamed::kFrameFieldNumber} &&
+              int{Viewed::kProgressFieldNumber} == int{Streamed::kProgressFieldNumber});
+
+bool FrameCall::begin() {
+  self_ = shared_from_this();
+  const auto status = streams_.add(self_);
+  if (!status.ok()) finish(status);
+  return status.ok();
+}
+
+grpc::Status FrameCall::find(const std::string& name, const std::string& uid,
+                             const v1::FrameFormat& format, std::vector<Problem> problems) {
+  const auto found = find_session(backend_.registry, name, "session");
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
+  name_ = name;
+  session_ = std::get<std::shared_ptr<Session>>(found);
+  if (!uid.empty() && uid != session_->uid()) {
+    return errors::aborted("UID_CHANGED", "this name belongs to another session now",
+                           {{"uid", session_->uid()}});
+  }
+  format_ = with_defaults(format);
+  const auto particles = static_cast<std::int64_t>(session_->status().newest->positions.size()) / 3;
+  for (auto& problem : find_problems(format, particles, backend_.limits.max_frame_bytes)) {
+    problems.push_back(std::move(problem));
+  }
+  return problems.empty() ? grpc::Status::OK : errors::field_invalid(problems);
+}
+
+void FrameCall::subscribe(std::optional<std::int64_t> start, SlowReader policy) {
+  subscription_ = session_->subscribe(weak_from_this(), start, policy);
+  state_changes_ = subscription_->progress().state_changes;
+}
+
+void FrameCall::offer() {
+  std::lock_guard lock(mutex_);
+  read_on();
+}
+
+void FrameCall::tick(Clock::time_point now) {
+  std::lock_guard lock(mutex_);
+  read_on(now - last_write_ >= FrameStreams::kProgressInterval);
+}
+
+void FrameCall::drain() {
+  std::lock_guard lock(mutex_);
+  ending_ = errors::server_draining(
+      last_frame_ ? errors::Metadata{{"last_frame", std::to_string(*last_frame_)}}
+                  : errors::Metadata{});
+  read_on();
+}
+
+void FrameCall::on_write_done(bool ok) {
+  std::lock_guard lock(mutex_);
+  writing_ = false;
+  message_.Clear();
+  if (!ok) ending_ = errors::cancelled();
+  read_on();
+}
+
+void FrameCall::on_cancel() {
+  std::lock_guard lock(mutex_);
+  ending_ = errors::cancelled();
+  read_on();
+}
+
+void FrameCall::on_done() {
+  const auto self = std::move(self_);
+  streams_.remove(self);
+}
+
+void FrameCall::read_on(bool progress_due) {
+  if (writing_ || finished_) return;
+  if (ending_) return finish(*ending_);
+  if (do_first() || !subscription_) return;
+  const Reading reading = subscription_->read(wants_frame());
+  switch (reading.kind) {
+    case Reading::Kind::kFrame: {
+      last_frame_ = reading.frame->number;
+      grpc::ByteBuffer message = message_of(reading);
+      ++backend_.stats.frames_sent;
+      backend_.stats.bytes_sent += static_cast<std::int64_t>(message.Length());
+      return write(std::move(message));
+    }
+    case Reading::Kind::kNothingYet:
+      if (wants_frame() && (progress_due || reading.progress.state_changes != state_changes_)) {
+        write_progress(reading.progress);
+      }
+      return;
+    case Reading::Kind::kExpired:
+      ++backend_.stats.slow_readers;
+      return finish(errors::frame_expired(subscription_->next_frame(), reading.progress));
+    case Reading::Kind::kFailed:
+      return finish(
+          errors::solver_failed(session_->status().failure, reading.progress.latest_frame));
+    case Reading::Kind::kDeleted:
+      return finish(errors::session_not_found(name_));
+  }
+}
+
+void FrameCall::write(grpc::ByteBuffer message) {
+  message_.Swap(&message);
+  writing_ = true;
+  last_write_ = Clock::now();
+  start_write(&message_);
+}
+
+void FrameCall::write_header() {
+  v1::StreamFramesResponse message;
+  v1::StreamHeader* header = message.mutable_header();
+  header->set_session(name_);
+  header->set_uid(session_->uid());
+  header->set_numerics_id(numerics_id());
+  header->set_frame_step_s(session_->scene().solver.frame_step);
+  std::int32_t first_particle = 0;
+  for (const auto& sheet : session_->scene().sheets) {
+    v1::SheetLayout* layout = header->add_sheets();
+    layout->set_name(sheet.name);
+    layout->set_first_particle(first_particle);
+    layout->set_rows(sheet.grid.rows);
+    layout->set_columns(sheet.grid.columns);
+    first_particle += sheet.particle_count();
+  }
+  *header->mutable_format() = format_;
+  header->set_start_frame(subscription_->next_frame());
+  write(encoded(message));
+}
+
+void FrameCall::write_progress(const Progress& progress) {
+  state_changes_ = progress.state_changes;
+  v1::StreamFramesResponse message;
+  v1::Progress* to = message.mutable_progress();
+  to->set_latest_frame(progress.latest_frame);
+  to->set_oldest_frame(progress.oldest_frame);
+  to->set_state(to_proto(progress.state));
+  to->set_at_rest(progress.at_rest);
+  write(encoded(message));
+}
+
+void FrameCall::finish(const grpc::Status& status) {
+  finished_ = true;
+  subscription_.reset();
+  finish_call(status);
+}
+
+}  // namespace weft

@@ -1,0 +1,83 @@
+#include "server/rpc/frame_view.h"
+
+#include <string>
+#include <utility>
+
+#include "server/rpc/errors.h"
+#include "server/rpc/frame_encoding.h"
+
+namespace weft {
+
+void FrameView::start() {
+  std::lock_guard lock(mutex_);
+  if (begin()) StartRead(&request_);
+}
+
+void FrameView::OnReadDone(bool ok) {
+  std::lock_guard lock(mutex_);
+  if (has_ended()) return;
+  if (!ok) {
+    no_more_ = true;
+  } else {
+    v1::ViewFramesRequest request;
+    const auto status = decode(request_, request)
+                            ? take(request)
+                            : errors::message_malformed("weft.v1.ViewFramesRequest");
+    request_.Clear();
+    if (status.ok()) {
+      StartRead(&request_);
+    } else {
+      end(status);
+    }
+  }
+  read_on();
+}
+
+grpc::Status FrameView::take(const v1::ViewFramesRequest& request) {
+  std::vector<Problem> problems;
+  const auto first_alone = [&](const char* field, bool given) {
+    if (given) problems.push_back({field, "belongs to the first message alone"});
+  };
+  if (request.credits() < 1 || request.credits() > kMostCredits) {
+    problems.push_back({"credits", std::to_string(request.credits()) + " is not within 1 to " +
+                                       std::to_string(kMostCredits)});
+  } else if (credits_ + request.credits() > kMostCredits) {
+    problems.push_back({"credits", std::to_string(credits_ + request.credits()) +
+                                       " would be open; at most " + std::to_string(kMostCredits) +
+                                       " are"});
+  }
+  if (is_subscribed()) {
+    first_alone("session", !request.session().empty());
+    first_alone("uid", !request.uid().empty());
+    first_alone("format", request.has_format());
+    if (!problems.empty()) return errors::field_invalid(problems);
+  } else {
+    auto status = find(request.session(), request.uid(), request.format(), std::move(problems));
+    if (!status.ok()) return status;
+    subscribe({}, SlowReader::kSkip);
+    write_header();
+  }
+  credits_ += request.credits();
+  return grpc::Status::OK;
+}
+
+bool FrameView::do_first() {
+  if (!no_more_ || credits_ > 0) return false;
+  finish(grpc::Status::OK);
+  return true;
+}
+
+grpc::ByteBuffer FrameView::message_of(const Reading& reading) {
+  --credits_;
+  grpc::ByteBuffer frame = encoded_frame(*reading.frame, format());
+  if (reading.skipped == 0) return frame;
+  // a message's fields may follow each other in any order and in pieces
+  v1::ViewFramesResponse rest;
+  rest.set_skipped_count(reading.skipped);
+  std::vector<grpc::Slice> slices;
+  frame.Dump(&slices);
+  slices.emplace_back(rest.SerializeAsString());
+  return {slices.data(), slices.size()};
+}
+
+}  // namespace weft

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <grpcpp/support/byte_buffer.h>
+#include <grpcpp/support/server_callback.h>
+
+#include "server/rpc/frame_call.h"
+
+namespace weft {
+
+// One call of ViewFrames. Without a credit it does nothing but wait for one.
+class FrameView final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
+                        public FrameCall {
+ public:
+  static constexpr int kMostCredits = 64;
+
+  using FrameCall::FrameCall;
+
+  // Called once, first.
+  void start();
+
+  void OnReadDone(bool ok) override;
+  void OnWriteDone(bool ok) override { on_write_done(ok); }
+  void OnCancel() override { on_cancel(); }
+  void OnDone() override { on_done(); }
+
+ private:
+  grpc::Status take(const v1::ViewFramesRequest& request);
+  bool do_first() override;
+  bool wants_frame() const override { return credits_ > 0; }
+  grpc::ByteBuffer message_of(const Reading& reading) override;
+  void start_write(const grpc::ByteBuffer* message) override { StartWrite(message); }
+  void finish_call(const grpc::Status& status) override { Finish(status); }
+
+  grpc::ByteBuffer request_;
+  int credits_ = 0;       // open
+  bool no_more_ = false;  // of the client's messages will come
+};
+
+}  // namespace weft

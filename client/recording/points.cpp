@@ -51,17 +51,19 @@ std::string as_doubles(const std::string& array, const v1::StreamHeader& header)
   const std::size_t particles = particle_count(header);
   const std::string bytes = unpack(array, 3 * particles).value();
   std::vector<std::uint64_t> numbers(3 * particles);
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
-    numbers[i % numbers.size()] |= std::uint64_t{static_cast<unsigned char>(bytes[i])}
-                                   << 8 * (i / numbers.size());
+  const char* byte = bytes.data();
+  for (std::size_t plane = 0; plane < bytes.size() / numbers.size(); ++plane) {
+    for (std::uint64_t& number : numbers)
+      number |= std::uint64_t{static_cast<unsigned char>(*byte++)} << 8 * plane;
   }
+  const double step = header.format().grid_step_m();
   std::vector<double> values(numbers.size());
-  std::uint64_t steps = 0;
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (i % particles == 0) steps = 0;
-    steps += numbers[i] >> 1 ^ -(numbers[i] & 1);
-    values[i] =
-        static_cast<double>(static_cast<std::int64_t>(steps)) * header.format().grid_step_m();
+  for (std::size_t first = 0; first < numbers.size(); first += particles) {
+    std::uint64_t steps = 0;
+    for (std::size_t i = first; i < first + particles; ++i) {
+      steps += numbers[i] >> 1 ^ -(numbers[i] & 1);
+      values[i] = static_cast<double>(static_cast<std::int64_t>(steps)) * step;
+    }
   }
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double)};
 }

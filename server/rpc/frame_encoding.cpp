@@ -45,13 +45,16 @@ std::string byte_planes(const std::vector<std::uint64_t>& numbers) {
 // keeps every value below 1e9, so that no sum leaves 64 bits.
 std::vector<std::uint64_t> quantized(const std::vector<double>& values, double step) {
   std::vector<std::uint64_t> numbers(values.size());
-  std::int64_t before = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (i % (values.size() / 3) == 0) before = 0;
-    const std::int64_t steps = std::llround(values[i] / step);
-    const std::int64_t difference = steps - std::exchange(before, steps);
-    numbers[i] =
-        static_cast<std::uint64_t>(difference) << 1 ^ static_cast<std::uint64_t>(difference >> 63);
+  const std::size_t particles = values.size() / 3;
+  for (std::size_t first = 0; first < values.size(); first += particles) {
+    std::int64_t before = 0;
+    for (std::size_t i = first; i < first + particles; ++i) {
+      const double steps = values[i] / step;
+      const auto nearest = static_cast<std::int64_t>(steps + std::copysign(0.5, steps));
+      const std::int64_t difference = nearest - std::exchange(before, nearest);
+      numbers[i] = static_cast<std::uint64_t>(difference) << 1 ^
+                   static_cast<std::uint64_t>(difference >> 63);
+    }
   }
   return numbers;
 }

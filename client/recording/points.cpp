@@ -36,9 +36,10 @@ Points read_planes(const std::string& planes, std::size_t first, std::size_t cou
 // The bytes in a packed array, where they are byte planes of so many numbers.
 std::optional<std::string> unpack(const std::string& array, std::size_t numbers) {
   constexpr std::size_t kMostPlanes = 8;
-  const auto size = ZSTD_getFrameContentSize(array.data(), array.size());
+  constexpr std::size_t kMostOfAByte = ZSTD_BLOCKSIZE_MAX / 3;  // a block has 3 bytes at least
+  const auto size = ZSTD_getFrameContentSize(array.data(), array.size());  // as it claims
   if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR || size < numbers ||
-      size % numbers != 0 || size / numbers > kMostPlanes) {
+      size % numbers != 0 || size / numbers > kMostPlanes || size / kMostOfAByte > array.size()) {
     return std::nullopt;
   }
   std::string bytes(size, '\0');
@@ -80,19 +81,30 @@ bool is_whole(const std::string& array, const v1::FrameFormat& format, std::size
   }
 }
 
+// Whether it is one of all particles that can be read.
+bool is_known(const v1::FrameFormat& format) {
+  if (format.first_particle() != 0 || format.has_particle_count() || format.has_stride())
+    return false;
+  switch (format.encoding()) {
+    case v1::FRAME_ENCODING_FLOAT32:
+    case v1::FRAME_ENCODING_FLOAT64:
+      return true;
+    case v1::FRAME_ENCODING_QUANTIZED_ZSTD:
+      return format.grid_step_m() > 0 && std::isfinite(format.grid_step_m());
+    default:
+      return false;
+  }
+}
+
 }  // namespace
 
 std::size_t particle_count(const v1::StreamHeader& header) {
   constexpr std::int64_t kMostParticles = std::numeric_limits<std::int32_t>::max();
-  const v1::FrameFormat& format = header.format();
   std::int64_t particles = 0;
   // frames are counted from here
   constexpr std::int64_t kLastStart = std::int64_t{1} << 62;
   bool sound = header.start_frame() >= 0 && header.start_frame() <= kLastStart;
-  sound = sound && (format.encoding() == v1::FRAME_ENCODING_FLOAT32 ||
-                    format.encoding() == v1::FRAME_ENCODING_FLOAT64 ||
-                    (format.encoding() == v1::FRAME_ENCODING_QUANTIZED_ZSTD &&
-                     format.grid_step_m() > 0 && std::isfinite(format.grid_step_m())));
+  sound = sound && is_known(header.format());
   for (const auto& sheet : header.sheets()) {
     sound = sound && sheet.rows() > 0 && sheet.columns() > 0 && sheet.first_particle() == particles;
     if (!sound) break;

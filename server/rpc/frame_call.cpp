@@ -93,10 +93,10 @@ void FrameCall::read_on(bool progress_due) {
   switch (reading.kind) {
     case Reading::Kind::kFrame: {
       last_frame_ = reading.frame->number;
-      grpc::ByteBuffer message = message_of(reading);
+      const grpc::ByteBuffer message = message_of(reading);
       ++backend_.stats.frames_sent;
       backend_.stats.bytes_sent += static_cast<std::int64_t>(message.Length());
-      return write(std::move(message));
+      return write(message);
     }
     case Reading::Kind::kNothingYet:
       if (wants_frame() && (progress_due || reading.progress.state_changes != state_changes_)) {
@@ -114,8 +114,8 @@ void FrameCall::read_on(bool progress_due) {
   }
 }
 
-void FrameCall::write(grpc::ByteBuffer message) {
-  message_.Swap(&message);
+void FrameCall::write(const grpc::ByteBuffer& message) {
+  message_ = message;  // shares the bytes
   writing_ = true;
   last_write_ = Clock::now();
   start_write(&message_);

@@ -44,7 +44,7 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
                     std::vector<Problem> problems);
   void subscribe(std::optional<std::int64_t> start, SlowReader policy);
   void write_header();
-  void write(grpc::ByteBuffer message);
+  void write(const grpc::ByteBuffer& message);
   void read_on(bool progress_due = false);
   void finish(const grpc::Status& status);
 

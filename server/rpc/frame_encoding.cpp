@@ -22,6 +22,32 @@ std::size_t value_bytes(const v1::FrameFormat& format) {
   return format.encoding() == v1::FRAME_ENCODING_FLOAT64 ? sizeof(double) : sizeof(float);
 }
 
+// Of all particles, as checked by find_problems: first, first + stride, ...
+struct Selection {
+  std::int64_t first = 0;
+  std::int64_t stride = 1;
+  std::int64_t count = 0;
+};
+
+Selection selection(const v1::FrameFormat& format, std::int64_t particles) {
+  const std::int64_t first = format.first_particle();
+  const std::int64_t stride = format.has_stride() ? format.stride() : 1;
+  const std::int64_t covered =
+      format.has_particle_count() ? format.particle_count() : particles - first;
+  return {first, stride, (covered + stride - 1) / stride};
+}
+
+std::vector<double> selected(const std::vector<double>& values, const Selection& wanted) {
+  std::vector<double> result;
+  const auto particles = static_cast<std::int64_t>(values.size() / 3);
+  result.reserve(static_cast<std::size_t>(3 * wanted.count));
+  for (const std::int64_t plane : {std::int64_t{0}, particles, 2 * particles}) {
+    for (std::int64_t i = 0; i < wanted.count; ++i)
+      result.push_back(values[static_cast<std::size_t>(plane + wanted.first + i * wanted.stride)]);
+  }
+  return result;
+}
+
 template <class Number>
 std::string planes_of(const std::vector<double>& values) {
   const std::vector<Number> numbers(values.begin(), values.end());
@@ -68,12 +94,22 @@ std::string compressed(const std::string& bytes) {
   return result;
 }
 
-std::string planes(const std::vector<double>& values, const v1::FrameFormat& format) {
-  if (format.encoding() == v1::FRAME_ENCODING_QUANTIZED_ZSTD) {
-    return compressed(byte_planes(quantized(values, format.grid_step_m())));
+std::string bytes_of(const std::vector<double>& values, const v1::FrameFormat& format) {
+  switch (format.encoding()) {
+    case v1::FRAME_ENCODING_FLOAT64:
+      return planes_of<double>(values);
+    case v1::FRAME_ENCODING_QUANTIZED_ZSTD:
+      return compressed(byte_planes(quantized(values, format.grid_step_m())));
+    default:
+      return planes_of<float>(values);
   }
-  return format.encoding() == v1::FRAME_ENCODING_FLOAT64 ? planes_of<double>(values)
-                                                         : planes_of<float>(values);
+}
+
+std::string array_of(const std::vector<double>& values, const v1::FrameFormat& format) {
+  const auto particles = static_cast<std::int64_t>(values.size() / 3);
+  const Selection wanted = selection(format, particles);
+  return wanted.count == particles ? bytes_of(values, format)
+                                   : bytes_of(selected(values, wanted), format);
 }
 
 v1::StreamFramesResponse message_of(const Frame& frame, const v1::FrameFormat& format) {
@@ -81,8 +117,8 @@ v1::StreamFramesResponse message_of(const Frame& frame, const v1::FrameFormat& f
   v1::Frame* to = message.mutable_frame();
   to->set_number(frame.number);
   to->set_time_s(frame.time);
-  to->set_positions_m(planes(frame.positions, format));
-  if (format.velocities()) to->set_velocities_m_per_s(planes(frame.velocities, format));
+  to->set_positions_m(array_of(frame.positions, format));
+  if (format.velocities()) to->set_velocities_m_per_s(array_of(frame.velocities, format));
   if (format.stats()) {
     v1::FrameStats* stats = to->mutable_stats();
     stats->set_kinetic_energy_j(frame.stats.kinetic_energy);
@@ -121,7 +157,8 @@ v1::FrameFormat with_defaults(v1::FrameFormat format) {
 
 std::int64_t frame_bytes(const v1::FrameFormat& format, std::int64_t particles) {
   constexpr std::int64_t kRest = 256;  // number, time, stats, tags and lengths
-  std::size_t bytes = static_cast<std::size_t>(particles) * 3 * value_bytes(format);
+  const auto values = static_cast<std::size_t>(3 * selection(format, particles).count);
+  std::size_t bytes = values * value_bytes(format);
   if (format.encoding() == v1::FRAME_ENCODING_QUANTIZED_ZSTD) bytes = ZSTD_compressBound(bytes);
   return kRest + static_cast<std::int64_t>(bytes) * (format.velocities() ? 2 : 1);
 }
@@ -137,6 +174,20 @@ std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t p
   if (format.has_grid_step_m() && !(step >= 1e-5 && step <= 0.1)) {  // NaN too
     problems.push_back({"format.grid_step_m", join(step, " m is not within 1e-05 to 0.1 m")});
   }
+  const auto check = [&](const char* field, std::int64_t value, std::int64_t low,
+                         std::int64_t high) {
+    if (value < low || value > high) {
+      problems.push_back({std::string("format.") + field,
+                          std::to_string(value) + " is not within " + std::to_string(low) + " to " +
+                              std::to_string(high)});
+    }
+  };
+  const std::int64_t first = format.first_particle();
+  check("first_particle", first, 0, particles - 1);
+  if (format.has_particle_count() && first >= 0 && first < particles)
+    check("particle_count", format.particle_count(), 1, particles - first);
+  if (format.has_stride()) check("stride", format.stride(), 1, particles);
+  if (!problems.empty()) return problems;
   const std::int64_t bytes = frame_bytes(format, particles);
   if (bytes > most_bytes) {
     problems.push_back({"format", "a frame of " + std::to_string(particles) + " particles takes " +

@@ -15,11 +15,11 @@ namespace weft {
 // The format with defaults filled in.
 v1::FrameFormat with_defaults(v1::FrameFormat format);
 
-// Bytes of a message with a frame of so many particles, at most. Of QUANTIZED_ZSTD: as long as no
-// two neighbours are 2^31 grid steps apart.
+// Bytes of a message with a frame of a session of so many particles, at most. Of QUANTIZED_ZSTD: as
+// long as no two neighbours are 2^31 grid steps apart.
 std::int64_t frame_bytes(const v1::FrameFormat& format, std::int64_t particles);
 
-// Why frames of so many particles are not sent in the format, each within `most_bytes`.
+// Why frames of such a session are not sent in the format, each within `most_bytes`.
 std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t particles,
                                    std::int64_t most_bytes);
 

@@ -81,6 +81,21 @@ TEST(StreamFrames, SendsWhatTheFormatAsksForAndNoMore) {
   EXPECT_EQ(floats(single.positions_m()), std::vector<float>(exact.begin(), exact.end()));
 }
 
+TEST(StreamFrames, SendsThePartOfTheParticlesThatIsAskedFor) {
+  Service service;
+  const v1::Session session = service.create();
+  auto request = frames_of(session, 0, 0);
+  const auto all = doubles(Stream(service, request).frame().positions_m());
+  request.mutable_format()->set_first_particle(5);
+  request.mutable_format()->set_particle_count(12);
+  request.mutable_format()->set_stride(4);
+  const auto some = doubles(Stream(service, request).frame().positions_m());
+  ASSERT_THAT(some, SizeIs(3 * 3));
+  for (std::size_t i = 0; i < some.size(); ++i) EXPECT_EQ(some[i], all[i / 3 * 20 + 5 + i % 3 * 4]);
+  request.mutable_format()->set_particle_count(16);
+  EXPECT_THAT(Stream(service, request).finish().fields(), ElementsAre("format.particle_count"));
+}
+
 TEST(StreamFrames, ResumedAfterABreakHasEveryFrameOnceAndBitEqual) {
   Service service;
   const v1::Session session = service.create();

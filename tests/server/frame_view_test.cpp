@@ -91,8 +91,9 @@ TEST(ViewFrames, SaysOfEveryFrameHowManyItSkipped) {
   const v1::Session session = service.create();
   service.step(session, 7);
   View view(service, view_of(session, 2));
+  std::int64_t next = view.frame().frame().number();
+  EXPECT_EQ(next++, 7);
   service.run(session, 1'000'000);
-  std::int64_t next = 7;
   for (int i = 0; i < 50; ++i) {
     const v1::ViewFramesResponse message = view.frame();
     ASSERT_EQ(message.frame().number(), next + message.skipped_count());

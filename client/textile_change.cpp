@@ -46,6 +46,7 @@ v1::UpdateTextileRequest textile_request(const v1::Session& session, const Texti
   v1::UpdateTextileRequest request;
   request.set_name(session.name());
   request.set_sheet(change.sheet);
+  if (change.duration_s) request.set_duration_s(*change.duration_s);
   const v1::Textile present = textile_of(session, change.sheet);
   if (!change.preset.empty()) {
     *request.mutable_textile() = present;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@ struct TextileChange {
   std::string sheet{};   // empty: the only one
   std::string preset{};  // damping and friction are not the preset's
   std::vector<std::pair<std::string, double>> values{};  // "bend_n_m2" or "raw.bend_n_m2"
+  std::optional<double> duration_s{};                    // simulated; absent: at once
 };
 
 // Throws where a textile has no such number.

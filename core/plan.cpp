@@ -238,6 +238,13 @@ void warn(const Scene& scene, const std::vector<SheetShape>& shapes, Plan& plan)
 
 }  // namespace
 
+std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver) {
+  if (step.substep > step.linear_bound && !solver.allow_unstable)
+    return StepRefusal{step.substep, step.linear_bound, false};
+  if (step.substeps > kMaxSubsteps) return StepRefusal{step.substep, step.linear_bound, true};
+  return std::nullopt;
+}
+
 Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes) {
   Plan plan;
   plan.step = plan_step(scene, shapes);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -55,6 +56,14 @@ struct Plan {
 
 // Most substeps of a frame that are ever run.
 inline constexpr std::int64_t kMaxSubsteps = 1'000'000;
+
+// Why a plan cannot be run.
+struct StepRefusal {
+  double asked = 0;                // s
+  double bound = 0;                // s
+  bool too_many_substeps = false;  // else: asked lies above the linear bound
+};
+std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver);
 
 // A sheet's present shape, as a plan sees it.
 struct SheetShape {

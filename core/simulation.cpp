@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <sstream>
 
 #include "core/contact/contact.h"
 #include "core/forces/air.h"
@@ -24,6 +25,7 @@ struct Sheet {
   SheetState next;  // at the end of the one that is being computed
   double skin = 0;  // m
   double most_strain = kMostStrain;
+  std::optional<TextileRamp> ramp;
 
   void read(SheetState& state) const {
     solver->positions(state.x);
@@ -118,11 +120,15 @@ struct Simulation::State {
   std::int64_t substeps = 0;  // of the last frame
   double rest_after = 0;      // s
   int halvings = 0;           // of the planned step
+  bool textile_changed = false;
   std::vector<Repair> repairs;
   std::string failure;
 
   State(Scene given, SolverFactory factory);
   SheetDefinition stepped(std::size_t sheet) const;
+  Plan plan_with(std::size_t sheet, const Textile& textile);
+  std::optional<StepRefusal> set_textile(std::size_t sheet, const Textile& textile);
+  bool change_textiles();
   void bind_forces();
   void step(double time, double dt, Crew& crew);
   bool compute_frame(Crew& crew);
@@ -278,6 +284,54 @@ void Simulation::State::go_on(const Course& course, double old_dt,
   }
 }
 
+// Puts the textile in its place.
+Plan Simulation::State::plan_with(std::size_t sheet, const Textile& textile) {
+  scene.sheets[sheet].textile = textile;
+  set_textile_of(scene, stepped(sheet), sheets[sheet]);
+  std::vector<Matrix3Xd> x;
+  for (const Sheet& each : sheets) x.push_back(each.good.x);
+  return plan_for(x);
+}
+
+std::optional<StepRefusal> Simulation::State::set_textile(std::size_t sheet,
+                                                          const Textile& textile) {
+  const double dt = plan.step.substep;
+  const Course before = course();
+  const Textile old = scene.sheets[sheet].textile;
+  Plan made = plan_with(sheet, textile);
+  if (const auto refused = find_refusal(made.step, scene.solver)) {
+    plan_with(sheet, old);
+    return refused;
+  }
+  plan = std::move(made);
+  sheets[sheet].solver = make_solver(scene, stepped(sheet), sheets[sheet].dynamics);
+  std::vector<bool> changed(sheets.size());
+  changed[sheet] = true;
+  go_on(before, dt, changed);
+  return std::nullopt;
+}
+
+// Gives sheets the textiles of the frame to come; false: one does not bear the step.
+bool Simulation::State::change_textiles() {
+  textile_changed = false;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    auto& ramp = sheets[s].ramp;
+    if (!ramp) continue;
+    if (const auto refused = set_textile(s, ramp->at(frame + 1))) {  // since particles were let go
+      std::ostringstream why;
+      why << "frame " << frame + 1 << " cannot be computed: as the textile of "
+          << scene.sheets[s].name << " changes, a substep of " << refused->asked
+          << " s lies above its linear bound of " << refused->bound << " s";
+      failure = why.str();
+      return false;
+    }
+    if (frame + 1 == ramp->end) ramp.reset();
+    textile_changed = true;
+    frames_at_rest = 0;
+  }
+  return true;
+}
+
 // Whether in the frame being computed kinetic energy and mean net forces, contact included, were
 // small. Net forces of one step would be as rough as positions are rounded.
 bool Simulation::State::quiet() const {
@@ -380,19 +434,8 @@ const Plan& Simulation::plan() const { return state_->plan; }
 std::int64_t Simulation::frame() const { return state_->frame; }
 double Simulation::time() const { return state_->time(); }
 
-namespace {
-
-std::optional<StepRefusal> refusal_of(const StepPlan& step, bool allow_unstable) {
-  if (step.substep > step.linear_bound && !allow_unstable)
-    return StepRefusal{step.substep, step.linear_bound, false};
-  if (step.substeps > kMaxSubsteps) return StepRefusal{step.substep, step.linear_bound, true};
-  return std::nullopt;
-}
-
-}  // namespace
-
 std::optional<StepRefusal> Simulation::refusal() const {
-  return refusal_of(state_->plan.step, state_->scene.solver.allow_unstable);
+  return find_refusal(state_->plan.step, state_->scene.solver);
 }
 
 bool Simulation::advance_frame(Crew& crew) {
@@ -400,11 +443,13 @@ bool Simulation::advance_frame(Crew& crew) {
   State& state = *state_;
   if (asleep()) {
     state.substeps = 0;
+    state.textile_changed = false;
     ++state.frame;
     return true;
   }
 
-  if (!state.failure.empty() || !state.compute_frame(crew)) return false;
+  if (!state.failure.empty() || !state.change_textiles() || !state.compute_frame(crew))
+    return false;
   state.substeps = state.plan.step.substeps;
   state.frames_at_rest = state.quiet() ? state.frames_at_rest + 1 : 0;
   for (Sheet& sheet : state.sheets) std::swap(sheet.good, sheet.next);
@@ -475,30 +520,33 @@ FrameStats Simulation::stats() const {
   return stats;
 }
 
-std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Textile& textile) {
+std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Textile& textile,
+                                                   double duration) {
   State& state = *state_;
-  SheetDefinition& definition = state.scene.sheets[index];
-  if (definition.textile == textile) return std::nullopt;
-
-  const double dt = state.plan.step.substep;
-  const Course course = state.course();
-  const Textile old_textile = std::exchange(definition.textile, textile);
-  set_textile_of(state.scene, state.stepped(index), state.sheets[index]);
-  Plan plan = state.plan_for(course.x);
-  if (const auto refused = refusal_of(plan.step, state.scene.solver.allow_unstable)) {
-    definition.textile = old_textile;
-    set_textile_of(state.scene, state.stepped(index), state.sheets[index]);
-    return refused;
+  Sheet& sheet = state.sheets[index];
+  const Textile now = state.scene.sheets[index].textile;
+  if (!sheet.ramp && textile == now) return std::nullopt;
+  const double frames = std::ceil(duration / state.scene.solver.frame_step - 1e-9);
+  if (frames <= 1) {
+    if (const auto refused = state.set_textile(index, textile)) return refused;
+    sheet.ramp.reset();
+  } else {
+    const Plan plan = state.plan_with(index, textile);
+    state.plan_with(index, now);
+    if (const auto refused = find_refusal(plan.step, state.scene.solver)) return refused;
+    const std::int64_t begin = state.frame;
+    sheet.ramp = {now, textile, begin, begin + static_cast<std::int64_t>(frames)};
   }
-  state.plan = std::move(plan);
-  state.sheets[index].solver =
-      state.make_solver(state.scene, state.stepped(index), state.sheets[index].dynamics);
-  std::vector<bool> changed(state.sheets.size());
-  changed[index] = true;
-  state.go_on(course, dt, changed);
   state.frames_at_rest = 0;
   return std::nullopt;
 }
+
+const Textile& Simulation::target_textile(std::size_t index) const {
+  const auto& ramp = state_->sheets[index].ramp;
+  return ramp ? ramp->to : state_->scene.sheets[index].textile;
+}
+
+bool Simulation::textile_changed() const { return state_->textile_changed; }
 
 Handling Simulation::handling() const { return state_->handling(); }
 
@@ -550,7 +598,7 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
   }
   if (plans) {
     Plan plan = state.plan_for(course.x);
-    if (const auto refused = refusal_of(plan.step, state.scene.solver.allow_unstable)) {
+    if (const auto refused = find_refusal(plan.step, state.scene.solver)) {
       state.adopt(before);
       return refused;
     }
@@ -573,45 +621,10 @@ Snapshot Simulation::snapshot() const {
   for (std::size_t s = 0; s < state.sheets.size(); ++s) {
     const Sheet& sheet = state.sheets[s];
     snapshot.sheets.push_back({state.scene.sheets[s].textile, sheet.most_strain, sheet.good.x,
-                               sheet.good.v, sheet.solver->save()});
+                               sheet.good.v, sheet.solver->save(), sheet.ramp});
   }
   return snapshot;
 }
-
-namespace {
-
-bool fits(const Scene& scene, const StepPlan& step, int halvings) {
-  const bool halved = halvings >= 0 && halvings <= scene.solver.max_repairs && halvings < 32 &&
-                      step.substeps % (std::int64_t{1} << halvings) == 0;
-  return halved && step.substeps >= 1 &&
-         step.substep == scene.solver.frame_step / static_cast<double>(step.substeps) &&
-         !refusal_of(step, scene.solver.allow_unstable);
-}
-
-bool fits(const SheetDefinition& definition, const Snapshot::Sheet& sheet) {
-  return sheet.x.cols() == definition.particle_count() && sheet.v.cols() == sheet.x.cols() &&
-         sheet.x.allFinite() && sheet.v.allFinite() && sheet.most_strain >= kMostStrain;
-}
-
-bool fits(const Scene& scene, const Handling& handling) {
-  return handling.pins.size() == scene.sheets.size() &&
-         handling.paths.size() == scene.colliders.size() &&
-         std::all_of(handling.grabs.begin(), handling.grabs.end(), [&](const Grab& grab) {
-           return grab.sheet < scene.sheets.size() && grab.particle >= 0 &&
-                  grab.particle < scene.sheets[grab.sheet].particle_count();
-         });
-}
-
-bool fits(const Scene& scene, const Snapshot& snapshot) {
-  if (snapshot.sheets.size() != scene.sheets.size() || snapshot.frame < 0 ||
-      snapshot.substeps < 0 || snapshot.frames_at_rest < 0 || !fits(scene, snapshot.handling))
-    return false;
-  for (std::size_t s = 0; s < scene.sheets.size(); ++s)
-    if (!fits(scene.sheets[s], snapshot.sheets[s])) return false;
-  return fits(scene, snapshot.plan.step, snapshot.halvings);
-}
-
-}  // namespace
 
 bool Simulation::restore(const Snapshot& snapshot) {
   if (!fits(state_->scene, snapshot)) return false;
@@ -642,6 +655,7 @@ bool Simulation::State::take_over(const Snapshot& snapshot) {
     Sheet& sheet = sheets[s];
     const Snapshot::Sheet& saved = snapshot.sheets[s];
     sheet.most_strain = saved.most_strain;
+    sheet.ramp = saved.ramp;
     sheet.good = {saved.x, saved.v, kinetic_energy(sheet.mesh, saved.v)};
     sheet.solver->start(saved.x, saved.v, time(), plan.step.substep);
     if (!sheet.solver->load(saved.solver)) return false;

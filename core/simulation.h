@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "core/model/handling.h"
 #include "core/model/scene.h"
 #include "core/motion/crew.h"
 #include "core/plan.h"
+#include "core/snapshot.h"
 
 namespace weft {
 
@@ -19,39 +19,6 @@ struct FrameStats {
   double kinetic_energy = 0;    // J
   double potential_energy = 0;  // elastic + gravity, 0 at the origin, J
   double largest_strain = 0;    // of the stretch connections
-};
-
-// Why a plan cannot be run.
-struct StepRefusal {
-  double asked = 0;                // s
-  double bound = 0;                // s
-  bool too_many_substeps = false;  // else: asked lies above the linear bound
-};
-
-// A frame that had to be computed again with half the step, which then stays.
-struct Repair {
-  std::int64_t frame = 0;
-  double substep = 0;  // from then on, s
-  std::string reason;
-};
-
-// A simulation between two frames, as plain values: all that its later frames depend on beside the
-// scene, and what it shows of itself.
-struct Snapshot {
-  struct Sheet {
-    Textile textile;
-    double most_strain = 0;  // that the guard allows
-    Matrix3Xd x, v;          // (3 x particles) m, m/s
-    std::string solver;      // SheetSolver::save()
-  };
-  std::int64_t frame = 0;
-  std::int64_t substeps = 0;  // that the frame took
-  int frames_at_rest = 0;
-  int halvings = 0;  // of the planned step
-  Plan plan;
-  std::vector<Repair> repairs;  // all so far
-  std::vector<Sheet> sheets;
-  Handling handling;
 };
 
 class SheetSolver;
@@ -107,9 +74,19 @@ class Simulation {
   FrameStats stats() const;
 
   // Changes the textile of a sheet between frames: positions and velocities stay, the step is
-  // planned anew. Changes nothing and returns the refusal when that step must not be run.
-  // Precondition: find_problems(textile, "") is empty; index < scene().sheets.size().
-  std::optional<StepRefusal> set_textile(std::size_t index, const Textile& textile);
+  // planned anew. Over `duration`, s, the textile changes with every frame, from what it is now, in
+  // the next one for the first time; a change under way ends where it has come. Changes nothing and
+  // returns the refusal when the step for the textile must not be run. Steps that both ends bear,
+  // all between them do: stiffness, damping and mass are linear in a textile's values.
+  // Precondition: find_problems(textile, "") is empty; index < scene().sheets.size(); with a
+  // duration both textiles are measured, or both raw.
+  std::optional<StepRefusal> set_textile(std::size_t index, const Textile& textile,
+                                         double duration = 0);
+  // The textile that a sheet has, or that its textile changes to.
+  const Textile& target_textile(std::size_t index) const;
+  // Whether the last frame was computed with another textile than was set: on the way to it, or the
+  // first there.
+  bool textile_changed() const;
 
   // What holds particles and moves colliders now.
   Handling handling() const;

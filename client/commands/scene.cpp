@@ -56,6 +56,9 @@ void add_new(CLI::App& scene, Context& context) {
                                                         {"exact", v1::EVALUATOR_EXACT},
                                                         {"linearized", v1::EVALUATOR_LINEARIZED},
                                                         {"polynomial", v1::EVALUATOR_POLYNOMIAL}};
+  const std::map<std::string, v1::Accuracy> accuracies{{"draft", v1::ACCURACY_DRAFT},
+                                                       {"standard", v1::ACCURACY_STANDARD},
+                                                       {"fine", v1::ACCURACY_FINE}};
   auto options = std::make_shared<NewOptions>();
   TemplateOptions& values = options->values;
   CLI::App* command = scene.add_subcommand("new", "Write a scene file from a template");
@@ -80,6 +83,9 @@ void add_new(CLI::App& scene, Context& context) {
       ->type_name("N")
       ->check(CLI::Range(1, 65536));
   command->add_flag("--fold-clamp", values.fold_clamp, "Linearize the clamped function (eq. 5)");
+  command->add_option("--accuracy", values.accuracy, "How close to the equations, and how fast")
+      ->transform(CLI::CheckedTransformer(accuracies))
+      ->option_text("draft|standard|fine");
   command->footer(template_list());
   command->callback([&context, options] { run_new(context, *options); });
 }

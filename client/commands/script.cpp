@@ -124,7 +124,7 @@ constexpr const char* kFooter =
     - expect: {at_rest: true, largest_strain: {max: 0.05}}
 
 create   template, with the options of `weft scene new`, or scene; fields: {PLACE: VALUE ...}
-set      preset or fields: {FIELD: VALUE ...}; sheet
+set      preset or fields: {FIELD: VALUE ...}; sheet; over_s, else at once
 grab     row, column; sheet; likewise release, pin and unpin
 drag     row, column; sheet; to_m: [X, Y, Z]; over_s; moves as the session runs on
 move     collider; to_m, an offset from its start; over_s

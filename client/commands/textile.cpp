@@ -71,6 +71,7 @@ struct SetOptions {
   std::string sheet;
   std::string preset;
   std::vector<std::string> values;  // "raw.bend_n_m2=1e-4"
+  std::optional<double> duration_s;
 };
 
 double read_number(const std::string& text, const std::string& setting) {
@@ -86,7 +87,8 @@ void run_set(Context& context, const SetOptions& options) {
   if (options.preset.empty() && options.values.empty()) {
     throw usage_problem("textile set: give --preset or --set");
   }
-  TextileChange change{.sheet = options.sheet, .preset = options.preset};
+  TextileChange change{
+      .sheet = options.sheet, .preset = options.preset, .duration_s = options.duration_s};
   for (const auto& setting : options.values) {
     const std::size_t equals = setting.find('=');
     if (equals == std::string::npos)
@@ -130,6 +132,8 @@ void add_textile(CLI::App& app, Context& context) {
       ->option_text("FIELD=VALUE ...")
       ->allow_extra_args(false)
       ->excludes(preset);
+  command->add_option("--over", set->duration_s, "How long the change takes; else it is at once")
+      ->type_name("SECONDS");
   command->callback([&context, set] { run_set(context, *set); });
 }
 

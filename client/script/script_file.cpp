@@ -223,11 +223,29 @@ class ScriptReader {
     return step;
   }
 
+  // One of some words, each with its value.
+  template <class Choices>
+  static auto read_choice(const char* key, const Choices& choices, Fields& fields)
+      -> std::optional<decltype(choices[0].second)> {
+    const auto name = fields.text(key);
+    if (!name) return std::nullopt;
+    std::string known;
+    for (const auto& [word, value] : choices) {
+      if (*name == word) return value;
+      known += std::string(known.empty() ? "" : ", ") + word;
+    }
+    fields.fault(key, fmt::format("\"{}\" is none of {}", *name, known));
+    return std::nullopt;
+  }
+
   static TemplateOptions read_template_options(Fields& fields) {
     constexpr std::array kEvaluators{std::pair{"series", v1::EVALUATOR_SERIES},
                                      std::pair{"exact", v1::EVALUATOR_EXACT},
                                      std::pair{"linearized", v1::EVALUATOR_LINEARIZED},
                                      std::pair{"polynomial", v1::EVALUATOR_POLYNOMIAL}};
+    constexpr std::array kAccuracies{std::pair{"draft", v1::ACCURACY_DRAFT},
+                                     std::pair{"standard", v1::ACCURACY_STANDARD},
+                                     std::pair{"fine", v1::ACCURACY_FINE}};
     TemplateOptions options;
     const auto count = [&](const char* key, std::int64_t most) -> std::optional<int> {
       const auto number = fields.whole_number(key, 1, most);
@@ -240,17 +258,11 @@ class ScriptReader {
     options.bend = fields.number("bend", 0, 1e5);
     options.segments = count("segments", 65536);
     options.fold_clamp = fields.flag("fold_clamp").value_or(false);
-    if (const auto name = fields.text("evaluator")) {
-      for (const auto& [known, evaluator] : kEvaluators) {
-        if (*name == known) options.evaluator = evaluator;
-      }
-      if (!options.evaluator)
-        fields.fault("evaluator",
-                     fmt::format("\"{}\" is not series, exact, linearized or polynomial", *name));
-    }
+    options.evaluator = read_choice("evaluator", kEvaluators, fields);
+    options.accuracy = read_choice("accuracy", kAccuracies, fields);
     if (fields.has("scene")) {
       for (const char* key : {"rows", "columns", "spacing_m", "textile", "bend", "segments",
-                              "fold_clamp", "evaluator"}) {
+                              "fold_clamp", "evaluator", "accuracy"}) {
         if (fields.has(key)) fields.fault(key, "is for a template; use fields with a scene");
       }
     }
@@ -293,6 +305,7 @@ class ScriptReader {
     step.session = read_session(fields);
     step.change.sheet = fields.text("sheet").value_or("");
     step.change.preset = fields.text("preset").value_or("");
+    step.change.duration_s = fields.number("over_s", 0, 1e4);
     const YAML::Node values = fields.node("fields");
     if (fields.has("preset") == fields.has("fields"))
       fields.fault("", "give either preset or fields");

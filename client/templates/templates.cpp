@@ -261,7 +261,9 @@ v1::Scene make_template(std::string_view name, const TemplateOptions& options) {
         throw usage_problem("rows and columns are 2 to " + std::to_string(kMostParticles));
       }
     }
-    return entry.make(options);
+    v1::Scene scene = entry.make(options);
+    if (options.accuracy) scene.mutable_solver()->set_accuracy(*options.accuracy);
+    return scene;
   }
   throw usage_problem("no template \"" + std::string(name) + "\"; there are " + names);
 }

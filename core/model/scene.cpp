@@ -15,4 +15,19 @@ Vector3d offset_at(const Path& path, double time) {
   return before.offset + share * (next->offset - before.offset);
 }
 
+SolverSettings default_settings(Accuracy accuracy) {
+  SolverSettings settings;
+  if (accuracy == Accuracy::kDraft) settings.max_self_weight_strain = 0.01;
+  if (accuracy == Accuracy::kFine) {
+    settings.precision = Precision::kDouble;
+    settings.safety /= 4;
+  }
+  return settings;
+}
+
+BendingLaw default_bending(Accuracy accuracy) {
+  if (accuracy != Accuracy::kFine) return ChoiKo{};
+  return ChoiKo{.evaluator = Evaluator::kPolynomial, .degree = 12};
+}
+
 }  // namespace weft

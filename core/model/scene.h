@@ -130,6 +130,16 @@ struct SolverSettings {
   std::optional<double> max_self_weight_strain;
 };
 
+// How close to its equations a scene is computed that does not say it value by value; errors by
+// tests/bench/reports/accuracy.
+enum class Accuracy {
+  kDraft,     // sheets stretch by 1 % of their height where their textile would less; long steps
+  kStandard,  // errors are far below what the mesh makes
+  kFine       // double precision and a quarter of the step
+};
+SolverSettings default_settings(Accuracy accuracy);
+BendingLaw default_bending(Accuracy accuracy);
+
 struct Scene {
   std::vector<SheetDefinition> sheets;
   std::vector<Collider> colliders;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <variant>
 
@@ -36,6 +37,15 @@ struct Textile {
   double friction = 0.3;  // Coulomb coefficient
 
   bool operator==(const Textile&) const = default;
+};
+
+// A textile that changes from frame to frame, linearly in every value: `from` up to frame `begin`,
+// `to` from frame `end` on. Precondition: both are measured or both are raw; begin < end.
+struct TextileRamp {
+  Textile from, to;
+  std::int64_t begin = 0, end = 0;
+
+  Textile at(std::int64_t frame) const;
 };
 
 }  // namespace weft

@@ -23,6 +23,8 @@ constexpr std::array kIntegrators = {IntegratorKind::kVerlet, IntegratorKind::kV
 constexpr std::array kLabTests = {LabTest::kTensile, LabTest::kTensile,    LabTest::kShear,
                                   LabTest::kBending, LabTest::kCantilever, LabTest::kChain,
                                   LabTest::kDrape};
+constexpr std::array kAccuracies = {Accuracy::kStandard, Accuracy::kDraft, Accuracy::kStandard,
+                                    Accuracy::kFine};
 constexpr std::array kPrecisions = {Precision::kSingle, Precision::kSingle, Precision::kDouble};
 
 std::string at(const std::string& field, int index) {
@@ -92,12 +94,14 @@ class Reader {
   Environment environment(const v1::Environment& from);
   SolverSettings solver(const v1::SolverSettings& from);
 
+  Accuracy accuracy_ = Accuracy::kStandard;
   std::vector<Problem> problems_;
   std::vector<std::string> stand_ins_;  // beginnings of paths
 };
 
 Scene Reader::scene(const v1::Scene& from) {
   Scene scene;
+  accuracy_ = choice(kAccuracies, from.solver().accuracy(), "solver.accuracy");
   const auto sheet_names = names("sheet", from.sheets());
   for (int i = 0; i < from.sheets_size(); ++i) {
     scene.sheets.push_back(sheet(from.sheets(i), at("sheets", i)));
@@ -122,7 +126,8 @@ SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
   } else {
     missing(field + ".textile", "a textile", field + ".textile.");
   }
-  if (from.has_bending()) sheet.bending = bending(from.bending(), field + ".bending");
+  sheet.bending =
+      from.has_bending() ? bending(from.bending(), field + ".bending") : default_bending(accuracy_);
   sheet.origin = vector(from.placement().origin_m());
   sheet.rotation = rotation(from.placement());
   sheet.start_positions = {from.start_positions_m().begin(), from.start_positions_m().end()};
@@ -254,9 +259,10 @@ Environment Reader::environment(const v1::Environment& from) {
 }
 
 SolverSettings Reader::solver(const v1::SolverSettings& from) {
-  SolverSettings solver;
+  SolverSettings solver = default_settings(accuracy_);
   solver.integrator = choice(kIntegrators, from.integrator(), "solver.integrator");
-  solver.precision = choice(kPrecisions, from.precision(), "solver.precision");
+  if (from.precision() != v1::PRECISION_UNSPECIFIED)
+    solver.precision = choice(kPrecisions, from.precision(), "solver.precision");
   if (from.has_frame_step_s()) solver.frame_step = from.frame_step_s();
   if (from.has_substep_s()) solver.substep = from.substep_s();
   solver.allow_unstable = from.allow_unstable();

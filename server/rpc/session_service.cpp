@@ -3,6 +3,7 @@
 #include <stop_token>
 #include <utility>
 
+#include "core/model/text.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/interaction.h"
@@ -194,12 +195,28 @@ grpc::ServerUnaryReactor* SessionService::UpdateTextile(grpc::CallbackServerCont
   if (!request->has_textile())
     return answer(context, errors::field_invalid("textile", "is absent"));
 
+  constexpr double kLongest = 1e4;  // s
   SetTextile command;
   command.sheet = std::get<std::size_t>(sheet);
-  command.edit =
-      [request](const Textile& current) {  // the request lives until the call is finished
-        return merge_textile(current, request->textile(), request->update_mask());
-      };
+  command.duration = request->duration_s();
+  if (!(command.duration >= 0 && command.duration <= kLongest)) {  // NaN too
+    return answer(context,
+                  errors::field_invalid("duration_s",
+                                        join(command.duration, " s is not within 0 to 10000 s")));
+  }
+  // the request lives until the call is finished
+  command.edit = [request](const Textile& current) -> Converted<Textile> {
+    auto edited = merge_textile(current, request->textile(), request->update_mask());
+    const auto* textile = std::get_if<Textile>(&edited);
+    if (textile != nullptr && request->duration_s() > 0 &&
+        textile->model.index() != current.model.index()) {
+      return std::vector<Problem>{
+          {"duration_s",
+           join(request->duration_s(),
+                " s lie between a measured and a raw textile; change between them at once")}};
+    }
+    return edited;
+  };
   return submit(backend_.calls, context, *request, session, std::move(command),
                 [response](const Applied& applied) {
                   response->set_applied_frame(applied.frame);

@@ -81,11 +81,13 @@ struct PauseCommand {
 // What becomes of a textile, or why it cannot.
 using TextileEdit = std::function<std::variant<Textile, std::vector<Problem>>(const Textile&)>;
 
-// Changes the textile of a sheet. Precondition: the sheet exists; find_problems has nothing to say
-// of what `edit` answers.
+// Changes the textile of a sheet; `edit` begins with the one that it has or changes to.
+// Precondition: the sheet exists; find_problems has nothing to say of what `edit` answers, and
+// Simulation::set_textile() can have it.
 struct SetTextile {
   std::size_t sheet = 0;
   TextileEdit edit;
+  double duration = 0;  // s
   Request request;
   Done done;
 };

@@ -30,6 +30,7 @@ struct Paused {};
 struct TextileSet {
   std::size_t sheet = 0;
   Textile textile;
+  double duration = 0;  // s
 };
 struct Acted {
   std::vector<Action> actions;  // of one hand

@@ -416,14 +416,15 @@ void Session::execute(SetTextile command) {
     refusal = refusal_of_change();
   }
   if (refusal) return command.done(*refusal);
-  const auto edited = command.edit(simulation_.scene().sheets[command.sheet].textile);
+  const auto edited = command.edit(simulation_.target_textile(command.sheet));
   if (const auto* problems = std::get_if<std::vector<Problem>>(&edited)) {
     std::unique_lock lock(mutex_);
     refusal = refuse(Refusal::Why::kInvalid, *problems);
     lock.unlock();
     return command.done(*refusal);
   }
-  carry_out(command.request, command.done, TextileSet{command.sheet, std::get<Textile>(edited)});
+  carry_out(command.request, command.done,
+            TextileSet{command.sheet, std::get<Textile>(edited), command.duration});
 }
 
 void Session::execute(Act command) {
@@ -482,10 +483,10 @@ Outcome Session::pause() {
 
 // Refused or not, the log repeats it: what it depends on is the same then.
 Outcome Session::apply(const TextileSet& change) {
-  const auto step = simulation_.set_textile(change.sheet, change.textile);
+  const auto step = simulation_.set_textile(change.sheet, change.textile, change.duration);
   std::lock_guard lock(mutex_);
   if (step) return Refusal{Refusal::Why::kUnstable, latest(), {}, *step, "textile"};
-  textiles_[change.sheet] = change.textile;
+  textiles_ = textiles_of(simulation_.scene());
   plan_ = std::make_shared<const Plan>(simulation_.plan());
   Applied done = applied(latest() + 1);
   done.textile = change.textile;
@@ -600,6 +601,10 @@ void Session::compute_frame(Clock::time_point due) {
     std::lock_guard lock(mutex_);
     if (closed_) return;
     history_.push(frame, first_held_frame());
+    if (simulation_.textile_changed()) {
+      textiles_ = textiles_of(simulation_.scene());
+      plan_ = std::make_shared<const Plan>(simulation_.plan());
+    }
     lateness_ = {};
     if (due != Clock::time_point::min()) {
       lateness_ = end - due;

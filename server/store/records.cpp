@@ -47,6 +47,7 @@ void set(stored::LogEntry* to, const Paused&) { to->mutable_paused(); }
 void set(stored::LogEntry* to, const TextileSet& from) {
   to->mutable_textile_set()->set_sheet(static_cast<std::int32_t>(from.sheet));
   *to->mutable_textile_set()->mutable_textile() = as_given(from.textile);
+  to->mutable_textile_set()->set_duration_s(from.duration);
 }
 
 void set(stored::LogEntry* to, const Acted& from) {
@@ -87,7 +88,8 @@ Event event_of(const stored::LogEntry& from) {
       return Paused{};
     case stored::LogEntry::kTextileSet:
       return TextileSet{static_cast<std::size_t>(from.textile_set().sheet()),
-                        trusted(to_textile(from.textile_set().textile(), "textile"))};
+                        trusted(to_textile(from.textile_set().textile(), "textile")),
+                        from.textile_set().duration_s()};
     case stored::LogEntry::kActed:
       return acted_of(from.acted());
     case stored::LogEntry::EVENT_NOT_SET:

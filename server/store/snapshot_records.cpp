@@ -54,6 +54,13 @@ void set(stored::KeptSheet* to, const Snapshot::Sheet& from, const std::vector<P
   to->mutable_positions_m()->Add(from.x.data(), from.x.data() + from.x.size());
   to->mutable_velocities_m_per_s()->Add(from.v.data(), from.v.data() + from.v.size());
   to->set_solver(from.solver);
+  if (from.ramp) {
+    stored::KeptRamp* ramp = to->mutable_ramp();
+    *ramp->mutable_from() = as_given(from.ramp->from);
+    *ramp->mutable_to() = as_given(from.ramp->to);
+    ramp->set_begin(from.ramp->begin);
+    ramp->set_end(from.ramp->end);
+  }
   for (const Pin& pin : pins) *to->add_pins() = to_proto(pin);
 }
 
@@ -166,6 +173,11 @@ SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes
     simulation.sheets.push_back({textile_of(each.textile()), each.most_strain(),
                                  columns_of(each.positions_m()),
                                  columns_of(each.velocities_m_per_s()), each.solver()});
+    if (each.has_ramp()) {
+      const stored::KeptRamp& ramp = each.ramp();
+      simulation.sheets.back().ramp = {textile_of(ramp.from()), textile_of(ramp.to()), ramp.begin(),
+                                       ramp.end()};
+    }
     auto& pins = simulation.handling.pins.emplace_back();
     for (const auto& pin : each.pins()) pins.push_back(to_pin(pin));
   }

@@ -254,6 +254,18 @@ TEST_F(CommandsTest, ATextileValueIsChangedWhileTheSessionRuns) {
   EXPECT_EQ(preset["textile"]["damping_kg_per_s"], 0.001) << "is not the preset's";
 }
 
+TEST_F(CommandsTest, ATextileChangesOverTheTimeGiven) {
+  service_.create(small_scene(), "cloth");
+  const auto set =
+      ask({"textile", "set", "cloth", "--set", "stretch_n_per_m=400", "--over", "0.1"});
+  EXPECT_EQ(set["textile"]["raw"]["stretch_n_per_m"], 400);
+  ask({"step", "cloth", "--frames", "3"});
+  const auto half = ask({"session", "get", "cloth"});
+  EXPECT_DOUBLE_EQ(half["scene"]["sheets"][0]["textile"]["raw"]["stretch_n_per_m"], 300);
+  const Outcome long_ = weft({"textile", "set", "cloth", "--set", "bend_n_m2=0", "--over", "1e5"});
+  EXPECT_THAT(long_.err, HasSubstr("duration_s: 1e+05 s is not within 0 to 10000 s"));
+}
+
 TEST_F(CommandsTest, ABadTextileValueIsNamed) {
   service_.create(small_scene(), "cloth");
   const Outcome negative = weft({"textile", "set", "cloth", "--set", "bend_n_m2=-1"});

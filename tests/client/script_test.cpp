@@ -104,6 +104,23 @@ steps:
       AllOf(HasSubstr("column is missing"), HasSubstr("drag.to_m")));
 }
 
+TEST_F(ScriptTest, ATextileChangesOverTime) {
+  EXPECT_EQ(ask({"script", script(R"(steps:
+  - create: {template: paper-1, rows: 7, columns: 7}
+  - set: {fields: {stretch_n_per_m: 200}, over_s: 2}
+  - run: {until_time_s: 1}
+  - expect: {strain: {max: 0.003}}
+  - run: {until_time_s: 4}
+  - expect: {strain: {min: 0.004}}
+)")})["failed"],
+            0);
+  EXPECT_THAT(refusal(R"(steps:
+  - create: {template: paper-1}
+  - set: {preset: denim_11oz, over_s: 0.5}
+)"),
+              HasSubstr("line 3: set.over_s: leads from raw to raw"));
+}
+
 TEST_F(ScriptTest, EveryCombinationOfALoopIsACase) {
   const auto result = ask({"script", script(R"(
 variables: {last: 3}

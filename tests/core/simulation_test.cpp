@@ -282,6 +282,110 @@ TEST(Simulation, AChangeOfTextileKeepsPositionsAndVelocities) {
             0.01 * v.colwise().norm().maxCoeff());
 }
 
+// Hung and at rest.
+Simulation at_rest() {
+  Scene scene = hanging();
+  std::get<RawTextile>(scene.sheets[0].textile.model).air_drag = 0.02;
+  Simulation simulation(scene);
+  while (!simulation.at_rest() && simulation.time() < 100) run(simulation, 1);
+  EXPECT_TRUE(simulation.at_rest());
+  return simulation;
+}
+
+double stretch_of(const Textile& textile) { return std::get<RawTextile>(textile.model).stretch; }
+
+Textile with_stretch(Textile textile, double factor) {
+  std::get<RawTextile>(textile.model).stretch *= factor;
+  return textile;
+}
+
+TEST(Simulation, ATextileChangesOverTheTimeGivenAndStays) {
+  Simulation simulation(hanging());
+  run(simulation, 3);
+  const Textile given = simulation.scene().sheets[0].textile, soft = with_stretch(given, 0.5);
+  const double frame_step = simulation.scene().solver.frame_step;
+  ASSERT_FALSE(simulation.set_textile(0, soft, 10 * frame_step));
+  EXPECT_EQ(simulation.scene().sheets[0].textile, given);
+  EXPECT_EQ(simulation.target_textile(0), soft);
+  for (int frame = 1; frame <= 10; ++frame) {
+    run(simulation, 1);
+    EXPECT_TRUE(simulation.textile_changed());
+    EXPECT_DOUBLE_EQ(stretch_of(simulation.scene().sheets[0].textile),
+                     stretch_of(given) * (1 - 0.05 * frame));
+  }
+  run(simulation, 1);
+  EXPECT_FALSE(simulation.textile_changed());
+  EXPECT_EQ(simulation.scene().sheets[0].textile, soft);
+  EXPECT_EQ(simulation.target_textile(0), soft);
+}
+
+TEST(Simulation, AnotherChangeOfATextileBeginsWhereTheFirstHasCome) {
+  Simulation simulation(hanging());
+  const Textile given = simulation.scene().sheets[0].textile;
+  const double frame_step = simulation.scene().solver.frame_step;
+  ASSERT_FALSE(simulation.set_textile(0, with_stretch(given, 3), 10 * frame_step));
+  run(simulation, 5);
+  EXPECT_DOUBLE_EQ(stretch_of(simulation.scene().sheets[0].textile), 2 * stretch_of(given));
+  ASSERT_FALSE(simulation.set_textile(0, given, 2 * frame_step));
+  run(simulation, 1);
+  EXPECT_DOUBLE_EQ(stretch_of(simulation.scene().sheets[0].textile), 1.5 * stretch_of(given));
+  ASSERT_FALSE(simulation.set_textile(0, with_stretch(given, 4)));
+  EXPECT_EQ(stretch_of(simulation.scene().sheets[0].textile), 4 * stretch_of(given));
+  run(simulation, 3);
+  EXPECT_EQ(stretch_of(simulation.scene().sheets[0].textile), 4 * stretch_of(given));
+}
+
+// Springs that are at once a quarter as stiff let the sheet fall; over many of its periods they let it
+// down.
+TEST(Simulation, ATextileThatChangesOverASecondDoesNotJerkTheSheet) {
+  const auto largest_acceleration = [](double duration) {
+    Simulation simulation = at_rest();
+    const Textile given = simulation.scene().sheets[0].textile;
+    EXPECT_FALSE(simulation.set_textile(0, with_stretch(given, 0.25), duration));
+    double largest = 0;
+    Matrix3Xd before = velocities(simulation);
+    while (simulation.time() < 100 && !simulation.at_rest()) {
+      run(simulation, 1);
+      const Matrix3Xd v = velocities(simulation);
+      largest = std::max(largest, (v - before).colwise().norm().maxCoeff());
+      before = v;
+    }
+    EXPECT_TRUE(simulation.at_rest());
+    return largest / simulation.scene().solver.frame_step;
+  };
+  constexpr double kGravity = 9.8;
+  const double at_once = largest_acceleration(0);
+  EXPECT_GT(at_once, 0.1 * kGravity);
+  EXPECT_LT(largest_acceleration(1), at_once / 10) << at_once;
+}
+
+TEST(Simulation, ASceneAtRestStaysAwakeWhileItsTextileChanges) {
+  Simulation simulation = at_rest();
+  const Textile given = simulation.scene().sheets[0].textile;
+  const double duration = 120 * simulation.scene().solver.frame_step;
+  ASSERT_FALSE(simulation.set_textile(0, with_stretch(given, 1.001), duration));
+  for (int frame = 0; frame < 120; ++frame) {
+    run(simulation, 1);
+    ASSERT_GT(simulation.substeps(), 0) << frame;
+  }
+  EXPECT_EQ(simulation.scene().sheets[0].textile, with_stretch(given, 1.001));
+  run(simulation, 60);
+  EXPECT_TRUE(simulation.asleep());
+}
+
+TEST(Simulation, AChangeToATextileThatTheStepDoesNotBearIsRefusedBeforeItBegins) {
+  Scene scene = hanging();
+  scene.solver.substep = Simulation(scene).plan().step.linear_bound * 0.99;
+  Simulation simulation(scene), left(scene);
+  const Textile given = scene.sheets[0].textile;
+  EXPECT_TRUE(simulation.set_textile(0, with_stretch(given, 100), 1));
+  EXPECT_EQ(simulation.target_textile(0), given);
+  run(simulation, 10);
+  run(left, 10);
+  EXPECT_EQ(positions(simulation), positions(left));
+  EXPECT_FALSE(simulation.set_textile(0, with_stretch(given, 0.5), 0.1)) << "a softer one it does";
+}
+
 TEST(Simulation, SettingTheSameTextileChangesNoBit) {
   Simulation changed(hanging()), left(hanging());
   run(changed, 10);

@@ -166,6 +166,25 @@ TEST(Snapshot, HoldsAndLeadsOnWhatActionsHold) {
   }
 }
 
+TEST(Snapshot, GoesOnInTheMiddleOfAChangeOfTextile) {
+  const Scene scene = busy();
+  Simulation simulation(scene);
+  Textile textile = scene.sheets[0].textile;
+  textile.damping *= 2;
+  std::get<RawTextile>(textile.model).stretch /= 3;
+  ASSERT_FALSE(simulation.set_textile(0, textile, 10 * scene.solver.frame_step));
+  advance(simulation, 4);
+  Simulation restored(scene);
+  ASSERT_TRUE(restored.restore(simulation.snapshot()));
+  for (int frame = 0; frame < 10; ++frame) {
+    SCOPED_TRACE(frame);
+    expect_same(restored, simulation);
+    advance(simulation, 1);
+    advance(restored, 1);
+  }
+  EXPECT_EQ(restored.scene().sheets[0].textile, textile);
+}
+
 TEST(Snapshot, OfASleepingSceneSleepsOnAndWakesAlike) {
   Scene scene = busy();
   scene.colliders.clear();
@@ -196,6 +215,18 @@ TEST(Snapshot, ThatDoesNotFitTheSceneIsRefusedAndChangesNothing) {
       [](Snapshot& s) { s.sheets[0].v.resize(3, 0); },
       [](Snapshot& s) { s.sheets[0].v(1, 7) = std::numeric_limits<double>::quiet_NaN(); },
       [](Snapshot& s) { s.sheets[0].most_strain = 0; },
+      [](Snapshot& s) {
+        s.sheets[0].ramp = {paper_textile(), paper_textile(), 0, s.frame};
+      },
+      [](Snapshot& s) {
+        s.sheets[0].ramp = {paper_textile(), paper_textile(), s.frame + 1, 9};
+      },
+      [](Snapshot& s) {
+        s.sheets[0].ramp = {paper_textile(), Textile(), 0, 9};
+      },
+      [](Snapshot& s) {
+        s.sheets[0].ramp = {paper_textile(-1), paper_textile(), 0, 9};
+      },
       [](Snapshot& s) { s.sheets[0].solver.pop_back(); },
       [](Snapshot& s) { s.sheets[0].solver += '\0'; },
       [](Snapshot& s) { s.sheets[0].solver.clear(); },

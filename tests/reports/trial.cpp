@@ -132,6 +132,20 @@ Simulation begin(const Case& given, const Setting& setting) {
   return Simulation(std::move(scene));
 }
 
+Outcome run(Simulation simulation, int frames) {
+  Outcome outcome;
+  outcome.finite = true;
+  const std::clock_t start = std::clock();
+  for (int frame = 0; frame < frames && outcome.finite; ++frame)
+    outcome.finite = simulation.advance_frame();
+  outcome.time = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC / simulation.time();
+  outcome.substep = simulation.plan().step.substep;
+  outcome.x = testing::positions(simulation);
+  const FrameStats stats = simulation.stats();
+  outcome.energy = stats.kinetic_energy + stats.potential_energy;
+  return outcome;
+}
+
 }  // namespace
 
 std::string Case::title() const { return fmt::format("{0}, {1} x {1}", name, side); }
@@ -174,19 +188,14 @@ std::string integrator_name(IntegratorKind kind) {
 }
 
 Outcome run(const Case& given, const Setting& setting, int frames) {
-  Simulation simulation = begin(given, setting);
-  Outcome outcome;
-  outcome.finite = true;
-  const std::clock_t start = std::clock();
-  for (int frame = 0; frame < frames && outcome.finite; ++frame)
-    outcome.finite = simulation.advance_frame();
-  outcome.time = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC /
-                 (frames * given.scene.solver.frame_step);
-  outcome.substep = simulation.plan().step.substep;
-  outcome.x = testing::positions(simulation);
-  const FrameStats stats = simulation.stats();
-  outcome.energy = stats.kinetic_energy + stats.potential_energy;
-  return outcome;
+  return run(begin(given, setting), frames);
+}
+
+Outcome run(const Case& given, Accuracy accuracy, int frames) {
+  Scene scene = given.scene;
+  scene.solver = default_settings(accuracy);
+  scene.sheets[0].bending = default_bending(accuracy);
+  return run(Simulation(std::move(scene)), frames);
 }
 
 int calm_frames(const Case& given, int most) {

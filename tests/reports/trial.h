@@ -57,6 +57,8 @@ struct Outcome {
   bool finite = false;
 };
 Outcome run(const Case& given, const Setting& setting, int frames);
+// As a scene is computed that states no more than an accuracy.
+Outcome run(const Case& given, Accuracy accuracy, int frames);
 
 // Frames, at most `most`, in which runs at the planned step and at half of it stay within 1 mm.
 int calm_frames(const Case& given, int most);

@@ -361,7 +361,7 @@ std::vector<std::string> known_requests(const std::string& type) {
       {"UpdateTextileRequest",
        "name: 'sessions/it' textile { raw { particle_mass_kg: 0.001 bend_n_m2: 1e-6 } } "
        "update_mask { paths: "
-       "'raw.bend_n_m2' }"},
+       "'raw.bend_n_m2' } duration_s: 0.5"},
       {"UpdateTextileRequest",
        "name: 'sessions/it' textile { measured { areal_density_kg_per_m2: 0.2 "
        "tensile_warp_n_per_m: 100 tensile_weft_n_per_m: 110 shear_n_per_m: 10 "

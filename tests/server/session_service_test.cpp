@@ -168,6 +168,36 @@ TEST(Sessions, AStepEndsWhenItsCallerGoesAway) {
   EXPECT_LT(service.step(session, 1).frame(), 100'000);
 }
 
+TEST(Accuracy, SetsWhatASceneLeavesOpenAndNothingElse) {
+  Service service;
+  v1::Scene scene = small_scene();
+  scene.mutable_sheets(0)->clear_bending();
+  const auto created = [&](v1::Accuracy accuracy) {
+    scene.mutable_solver()->set_accuracy(accuracy);
+    return service.create(scene);
+  };
+  const v1::Session standard = created(v1::ACCURACY_UNSPECIFIED);
+  EXPECT_EQ(created(v1::ACCURACY_STANDARD).scene().SerializeAsString(),
+            standard.scene().SerializeAsString());
+
+  const v1::Session draft = created(v1::ACCURACY_DRAFT);
+  EXPECT_EQ(draft.scene().solver().max_self_weight_strain(), 0.01);
+  EXPECT_EQ(draft.scene().solver().safety(), 0.9);
+
+  const v1::Session fine = created(v1::ACCURACY_FINE);
+  EXPECT_EQ(fine.scene().solver().precision(), v1::PRECISION_DOUBLE);
+  EXPECT_EQ(fine.scene().sheets(0).bending().choi_ko().evaluator(), v1::EVALUATOR_POLYNOMIAL);
+  EXPECT_LT(fine.plan().substep_s(), 0.26 * standard.plan().linear_bound_s());
+
+  scene.mutable_solver()->set_safety(0.5);
+  scene.mutable_solver()->set_precision(v1::PRECISION_SINGLE);
+  scene.mutable_sheets(0)->mutable_bending()->mutable_isometric();
+  const v1::Session given = created(v1::ACCURACY_FINE);
+  EXPECT_EQ(given.scene().solver().safety(), 0.5);
+  EXPECT_EQ(given.scene().solver().precision(), v1::PRECISION_SINGLE);
+  EXPECT_TRUE(given.scene().sheets(0).bending().has_isometric());
+}
+
 TEST(UpdateTextile, ChangesAWholeTextileFromTheNextFrameOn) {
   Service service;
   const v1::Session session = service.create();
@@ -230,6 +260,38 @@ TEST(UpdateTextile, WithBadValuesChangesNothing) {
   no_sheet.set_sheet("other");
   EXPECT_THAT(fields_of(no_sheet), ElementsAre("sheet"));
   EXPECT_EQ(service.get(session).scene().SerializeAsString(), session.scene().SerializeAsString());
+}
+
+TEST(UpdateTextile, OverTimeAnswersWithItsEndAndShowsWhereItHasCome) {
+  Service service;
+  const v1::Session session = service.create();
+  auto request = update(session, {"raw.stretch_n_per_m"});
+  const double given = session.scene().sheets(0).textile().raw().stretch_n_per_m();
+  request.mutable_textile()->mutable_raw()->set_stretch_n_per_m(2 * given);
+  request.set_duration_s(0.1);
+  v1::UpdateTextileResponse response;
+  ASSERT_TRUE(service.call(&Sessions::UpdateTextile, request, &response).ok());
+  EXPECT_EQ(response.applied_frame(), 1);
+  EXPECT_EQ(response.textile().raw().stretch_n_per_m(), 2 * given);
+  const auto stretch_now = [&] {
+    return service.get(session).scene().sheets(0).textile().raw().stretch_n_per_m();
+  };
+  EXPECT_EQ(stretch_now(), given);
+  service.step(session, 3);
+  EXPECT_DOUBLE_EQ(stretch_now(), 1.5 * given);
+  service.step(session, 3);
+  EXPECT_EQ(stretch_now(), 2 * given);
+}
+
+TEST(UpdateTextile, DoesNotChangeBetweenRawAndMeasuredOverTime) {
+  Service service;
+  const v1::Session session = service.create();
+  auto request = update(session);
+  request.mutable_textile()->set_preset("denim_11oz");
+  request.set_duration_s(1);
+  EXPECT_THAT(service.error(&Sessions::UpdateTextile, request).fields(), ElementsAre("duration_s"));
+  request.set_duration_s(0);
+  EXPECT_EQ(service.error(&Sessions::UpdateTextile, request).code, grpc::StatusCode::OK);
 }
 
 TEST(UpdateTextile, IsRefusedWhereAForcedStepBecomesUnstable) {

@@ -89,6 +89,39 @@ TEST_F(Restart, HasEverySessionWhereItWasWithTheSameFrames) {
   }
 }
 
+TEST_F(Restart, GoesOnWithATextileThatIsChanging) {
+  for (const int snapshot_ms : {2000, 0}) {  // by the log; by snapshots
+    snapshot_ms_ = snapshot_ms;
+    restart();
+    const v1::Session session = service_->create();
+    v1::UpdateTextileRequest request;
+    request.set_name(session.name());
+    request.mutable_textile()->mutable_raw()->set_stretch_n_per_m(40);
+    request.mutable_update_mask()->add_paths("raw.stretch_n_per_m");
+    request.set_duration_s(0.5);
+    ASSERT_EQ(service_->error(&Sessions::UpdateTextile, request).code, grpc::StatusCode::OK);
+    service_->step(session, 10);
+    restart();
+    service_->step(session, 5);
+
+    const v1::Session undisturbed = service_->create();
+    request.set_name(undisturbed.name());
+    ASSERT_EQ(service_->error(&Sessions::UpdateTextile, request).code, grpc::StatusCode::OK);
+    service_->step(undisturbed, 15);
+    const auto textile = [&](const v1::Session& of) {
+      return service_->get(of).scene().sheets(0).textile().SerializeAsString();
+    };
+    EXPECT_EQ(textile(session), textile(undisturbed));
+    service_->step(session, 25);
+    service_->step(undisturbed, 25);
+    EXPECT_EQ(textile(session), textile(undisturbed));
+    const auto newest = [&](const v1::Session& of) {
+      return Stream(*service_, frames_of(of, 40, 40)).rest().at(0).positions_m();
+    };
+    EXPECT_EQ(newest(session), newest(undisturbed));
+  }
+}
+
 TEST_F(Restart, RepeatsActionsAndLetsGoOfWhatStreamsHeld) {
   const v1::Session session = service_->create();
   service_->step(session, 4);

@@ -226,6 +226,27 @@ TEST(Session, ChangesATextileFromTheNextFrameOn) {
   EXPECT_EQ(newest->positions, positions);
 }
 
+TEST(Session, ShowsATextileThatChangesOverTimeAsItIs) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler);
+  const auto bend = [&] { return std::get<RawTextile>(session->status().textiles[0].model).bend; };
+  SetTextile command;
+  command.edit = [](Textile textile) {
+    std::get<RawTextile>(textile.model).bend *= 3;
+    return textile;
+  };
+  command.duration = 4.0 / 60;
+  EXPECT_EQ(Answer(*session, command).applied().frame, 1);
+  EXPECT_DOUBLE_EQ(bend(), 1e-5);
+  step(*session, 2).applied();
+  EXPECT_DOUBLE_EQ(bend(), 2e-5);
+  command.duration = 0;
+  EXPECT_DOUBLE_EQ(std::get<RawTextile>(Answer(*session, command).applied().textile.model).bend,
+                   9e-5)
+      << "an edit begins with what the textile changes to";
+  EXPECT_DOUBLE_EQ(bend(), 9e-5);
+}
+
 TEST(Session, AnEditThatFindsProblemsChangesNothing) {
   Scheduler scheduler(2);
   const auto session = make_session(scheduler);

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/model/handling.h"
+#include "core/model/mesh.h"
+#include "core/plan.h"
+
+namespace weft {
+
+// A frame that had to be computed again with half the step, which then stays.
+struct Repair {
+  std::int64_t frame = 0;
+  double substep = 0;  // from then on, s
+  std::string reason;
+};
+
+// A simulation between two frames, as plain values: all that its later frames depend on beside the
+// scene, and what it shows of itself.
+struct Snapshot {
+  struct Sheet {
+    Textile textile;         // of the frame
+    double most_strain = 0;  // that the guard allows
+    Matrix3Xd x, v;          // (3 x particles) m, m/s
+    std::string solver;      // SheetSolver::save()
+    std::optional<TextileRamp> ramp = {};
+  };
+  std::int64_t frame = 0;
+  std::int64_t substeps = 0;  // that the frame took
+  int frames_at_rest = 0;
+  int halvings = 0;  // of the planned step
+  Plan plan;
+  std::vector<Repair> repairs;  // all so far
+  std::vector<Sheet> sheets;
+  Handling handling;
+};
+
+// Whether a simulation of the scene, whatever its textiles are, could have been there.
+bool fits(const Scene& scene, const Snapshot& snapshot);
+
+}  // namespace weft

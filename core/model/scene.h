@@ -130,10 +130,10 @@ struct SolverSettings {
   std::optional<double> max_self_weight_strain;
 };
 
-// How close to its equations a scene is computed that does not say it value by value; errors by
-// tests/bench/reports/accuracy.
+// How close to its equations a scene is computed that does not say it value by value; the interface
+// has the errors.
 enum class Accuracy {
-  kDraft,     // sheets stretch by 1 % of their height where their textile would less; long steps
+  kDraft,     // sheets stretch by 1 % under their weight where their textile would less
   kStandard,  // errors are far below what the mesh makes
   kFine       // double precision and a quarter of the step
 };

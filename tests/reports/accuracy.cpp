@@ -447,8 +447,11 @@ class AccuracyPage {
       rows.push_back(row);
     }
     page_.table({"scene", "planned step", "/ 2", "/ 4", "/ 8", "RMS m", "times faster"}, rows);
-    page_.text(over.empty() ? "It is nowhere more."
-                            : fmt::format("**It is more in: {}.**", fmt::join(over, "; ")));
+    page_.text(over.empty()
+                   ? "It is nowhere more."
+                   : fmt::format("**It is more in: {}.** In single precision neighbours of a "
+                                 "coordinate of 1 m lie 1.2e-07 m apart.",
+                                 fmt::join(over, "; ")));
   }
 
   void segments() {

@@ -67,6 +67,7 @@ void describe_solver(const Scene& scene, const SheetDefinition& sheet, Plan& pla
 }
 
 void describe_families(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan) {
+  const bool pushes = resists_compression(sheet.bending);
   const auto describe = [&](FamilyKind kind, const char* name, const std::string& why_idle) {
     std::size_t pulling = 0;
     for (const Family& family : mesh.families)
@@ -74,7 +75,9 @@ void describe_families(const SheetDefinition& sheet, const Mesh& mesh, Plan& pla
         pulling += family.connections.size();
     const std::string pass = join(sheet.name, ": ", name);
     if (pulling > 0)
-      plan.passes.push_back(join(pass, ", ", pulling, " connections"));
+      plan.passes.push_back(
+          join(pass, ", ", pulling, " connections",
+               pushes && kind == FamilyKind::kStretch ? " that resist compression too" : ""));
     else
       plan.skipped.push_back({pass, why_idle});
   };

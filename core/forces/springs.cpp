@@ -46,7 +46,9 @@ void add_spring_forces(const Mesh& mesh, const Matrix3Xd& x, const Matrix3Xd& v,
           family.bend->function());
     } else {
       const bool pulls = family.stiffness > 0;
-      const auto active = [&](double squared) { return pulls && squared >= squared_rest; };
+      const auto active = [&](double squared) {
+        return pulls && (squared >= squared_rest || (family.pushes && squared > 0));
+      };
       add_family(family, mesh.damping, x, v, force, active,
                  [&](double length) { return family.stiffness * (length - rest); });
     }
@@ -61,7 +63,8 @@ double spring_energy(const Mesh& mesh, const Matrix3Xd& x) {
       if (family.bend) {
         energy += family.bend->energy(length);
       } else {
-        const double stretch = std::max(0.0, length - family.rest_length);
+        const double stretch =
+            std::max(family.pushes ? -family.rest_length : 0.0, length - family.rest_length);
         energy += family.stiffness / 2 * stretch * stretch;
       }
     }

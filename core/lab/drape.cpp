@@ -64,8 +64,8 @@ void add_shares(const Family& family, const BendingLaw& bending, const Cells& ce
       if (const double share = cells.share(i, j); share > 0)
         by_share[share].emplace_back(place[i], place[j]);
   for (auto& [share, connections] : by_share) {
-    Family part{family.kind, family.rest_length, share * family.stiffness, std::nullopt,
-                std::move(connections)};
+    Family part{family.kind,  family.rest_length,     share * family.stiffness,
+                std::nullopt, std::move(connections), family.pushes};
     if (family.bend) {
       const BendingForce& bend = *family.bend;
       const double k_b = bend.scale() * bend.rest_length() * bend.rest_length();
@@ -189,11 +189,6 @@ void hang(const LabOrder& order, double spacing, const std::stop_token& stop, La
   const Equilibrium rest = settle(disc, start);
   note_unsettled(rest, tolerance, report);
   look("", disc, rest.x, report);
-  if (!isometric) return;
-  resist_compression(disc.mesh);
-  const Equilibrium unshortened = settle(disc, disc.start);
-  note_unsettled(unshortened, tolerance, report);
-  look(", not shortened", disc, unshortened.x, report);
 }
 
 }  // namespace
@@ -279,10 +274,6 @@ LabReport drape(const LabOrder& order, const LabWatch& watch) {
   }
   for_each_specimen(spacings, watch,
                     [&](double spacing) { hang(order, spacing, watch.stop, report); });
-  if (std::holds_alternative<Isometric>(order.bending))
-    report.notes.emplace_back(
-        "eq. 2 lets a connection be shortened at no cost, so that the ring narrows where cloth "
-        "folds: the figure of connections that resist compression is the one to compare");
   report.notes.emplace_back(
       "without the friction inside cloth it hangs limper than cloth of the same measured rigidity; "
       "folds pass through each other where they touch");

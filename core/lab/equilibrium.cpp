@@ -80,7 +80,7 @@ class Statics {
                           family.bend->function()) /
                length;
     } else {
-      if (length < rest) return;
+      if (length < rest && (!family.pushes || length == 0)) return;
       along = family.stiffness;
       across = family.stiffness * (1 - rest / length);
     }

@@ -16,7 +16,6 @@ namespace {
 constexpr int kMostParticles = 6000;  // of a specimen: seconds of Newton's method
 constexpr double kWidth = 0.025;      // of a strip, m: ASTM D1388
 constexpr const char* kChordAngle = "chord angle";
-constexpr const char* kChordAngleUnshortened = "chord angle, not shortened";
 
 int steps_of(double length, double spacing) {
   return std::max(1, static_cast<int>(std::lround(length / spacing)));
@@ -215,9 +214,6 @@ void hang_over(const MeasuredTextile& textile, const LabOrder& order, double ove
     curve.rows.push_back({x.x(), -x.y()});
   }
   report.curves.push_back(std::move(curve));
-  if (!std::holds_alternative<Isometric>(order.bending)) return;
-  resist_compression(strip.specimen.mesh);
-  report.values.push_back(strip.angle(kChordAngleUnshortened, strip.settle(stop, report)));
 }
 
 double overhang_of(const MeasuredTextile& textile) {
@@ -261,12 +257,7 @@ LabReport cantilever(const LabOrder& order, const LabWatch& watch) {
   const Eigen::Matrix2Xd shape = heavy_elastica(kCantileverQ, 101);
   for (const Eigen::Vector2d point : shape.colwise())
     report.curves.back().rows.push_back({overhang * point.x(), overhang * point.y()});
-  if (std::holds_alternative<Isometric>(order.bending)) {
-    report.notes.emplace_back(
-        "eq. 2 lets a connection be shortened at no cost, and bending shortens the strip near its "
-        "clamp, where its weight does not pull: it hangs lower than with connections that resist "
-        "compression");
-  } else {
+  if (std::holds_alternative<ChoiKo>(order.bending)) {
     const LabValue& finest = *std::min_element(
         report.values.begin(), report.values.end(),
         [](const LabValue& a, const LabValue& b) { return a.spacing < b.spacing; });

@@ -1,6 +1,5 @@
 #include "core/lab/specimen.h"
 
-#include <cmath>
 #include <utility>
 
 #include "core/model/text.h"
@@ -23,22 +22,6 @@ Specimen cut(const MeasuredTextile& textile, const BendingLaw& bending, int rows
   specimen.start = start_positions(specimen.sheet);
   specimen.held.setZero(rows * columns);
   return specimen;
-}
-
-void resist_compression(Mesh& mesh) {
-  std::vector<Family> pushing;
-  for (const Family& family : mesh.families) {
-    if (family.kind != FamilyKind::kStretch || family.stiffness == 0) continue;
-    // a clamp that rules everywhere: k (l - L) for l < L
-    const double rest = family.rest_length;
-    Family push = family;
-    push.stiffness = 0;
-    push.bend.emplace(ChoiKo{.evaluator = Evaluator::kExact},
-                      2 * family.stiffness * std::pow(rest, 3) / kClampRules, family.stiffness,
-                      rest);
-    pushing.push_back(std::move(push));
-  }
-  mesh.families.insert(mesh.families.end(), pushing.begin(), pushing.end());
 }
 
 MeasuredTextile along_warp(const LabOrder& order) {

@@ -25,9 +25,6 @@ struct Specimen {
 Specimen cut(const MeasuredTextile& textile, const BendingLaw& bending, int rows, int columns,
              double spacing);
 
-// Pushes against being shortened what pulls against being stretched.
-void resist_compression(Mesh& mesh);
-
 // The textile of an order; one whose specimen is cut along the weft is turned.
 MeasuredTextile along_warp(const LabOrder& order);
 

@@ -49,10 +49,11 @@ LatticeConstants constants(const MeasuredTextile& textile, double h, bool diagon
           weft};
 }
 
-void add_stretch(Mesh& mesh, const Grid& grid, int rows, int columns, double k, double edge_share) {
+void add_stretch(Mesh& mesh, const Grid& grid, int rows, int columns, double k, double edge_share,
+                 bool pushes) {
   const auto add = [&](Part part, double share) {
     mesh.families.push_back({FamilyKind::kStretch, grid.spacing, k * share, std::nullopt,
-                             connections(grid, rows, columns, part)});
+                             connections(grid, rows, columns, part), pushes});
   };
   if (edge_share == 1) return add(Part::kAll, 1);
   add(Part::kInside, 1);
@@ -94,6 +95,11 @@ void add_stencils(Mesh& mesh, const Grid& grid, const LatticeConstants& k) {
 }
 
 }  // namespace
+
+bool resists_compression(const BendingLaw& bending) {
+  const auto* isometric = std::get_if<Isometric>(&bending);
+  return isometric != nullptr && isometric->resist_compression;
+}
 
 LatticeConstants lattice_constants(const SheetDefinition& sheet) {
   const ChoiKo* law = std::get_if<ChoiKo>(&sheet.bending);
@@ -139,8 +145,9 @@ Mesh make_lattice(const SheetDefinition& sheet) {
     }
   }
 
-  add_stretch(mesh, grid, 0, 1, k.stretch_warp, k.edge_share);
-  add_stretch(mesh, grid, 1, 0, k.stretch_weft, k.edge_share);
+  const bool pushes = resists_compression(sheet.bending);
+  add_stretch(mesh, grid, 0, 1, k.stretch_warp, k.edge_share, pushes);
+  add_stretch(mesh, grid, 1, 0, k.stretch_weft, k.edge_share, pushes);
   for (const int columns : {1, -1})
     mesh.families.push_back({FamilyKind::kShear, h * std::numbers::sqrt2, k.shear, std::nullopt,
                              connections(grid, 1, columns)});

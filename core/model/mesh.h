@@ -27,6 +27,7 @@ struct Family {
   double stiffness;                  // k of eq. 2, N/m; 0 for bend
   std::optional<BendingForce> bend;  // eq. 3 to 5; absent: no force
   std::vector<Connection> connections;
+  bool pushes = false;  // where it is shortened, as it pulls by eq. 2
 };
 
 // Energy stiffness / 2 |sum weight_k x_k|^2 over up to four particles: the isometric law.
@@ -45,6 +46,9 @@ struct Mesh {
   std::vector<Stencil> stencils;
   std::vector<std::array<int, 3>> triangles;
 };
+
+// Whether stretch connections push.
+bool resists_compression(const BendingLaw& bending);
 
 // Constants of a textile on a lattice, inside it. Connections that lie along an edge have
 // edge_share of them: half of the sheet is missing there.

@@ -43,7 +43,11 @@ struct ChoiKo {
   bool diagonal_bend = true;
 };
 
-struct Isometric {};
+struct Isometric {
+  // Stretch connections push as they pull. Cloth in its plane does; by eq. 2 it is shortened at no
+  // cost.
+  bool resist_compression = true;
+};
 
 using BendingLaw = std::variant<ChoiKo, Isometric>;
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numbers>
 
 namespace weft {
@@ -130,15 +131,16 @@ template <class T>
 SweepLaw<T> make_sweep_law(const SheetDefinition& sheet) {
   const LatticeConstants k = lattice_constants(sheet);
   const double h = sheet.grid.spacing;
-  const auto stretch = [](double stiffness, double length) {
-    return StretchLaw<T>{static_cast<T>(stiffness), static_cast<T>(stiffness * length)};
+  const T least = resists_compression(sheet.bending) ? std::numeric_limits<T>::lowest() : T(0);
+  const auto stretch = [](double stiffness, double length, T lowest) {
+    return StretchLaw<T>{static_cast<T>(stiffness), static_cast<T>(stiffness * length), lowest};
   };
   SweepLaw<T> law;
   law.layout = {sheet.grid.rows, sheet.grid.columns};
-  law.warp = stretch(k.stretch_warp, h);
-  law.warp_edge = stretch(k.edge_share * k.stretch_warp, h);
-  law.weft = stretch(k.stretch_weft, h);
-  law.shear = stretch(k.shear, h * std::numbers::sqrt2);
+  law.warp = stretch(k.stretch_warp, h, least);
+  law.warp_edge = stretch(k.edge_share * k.stretch_warp, h, least);
+  law.weft = stretch(k.stretch_weft, h, least);
+  law.shear = stretch(k.shear, h * std::numbers::sqrt2, 0);
   set_bending(sheet, k, law);
   if (const auto* choi_ko = std::get_if<ChoiKo>(&sheet.bending)) {
     law.damp_far = true;

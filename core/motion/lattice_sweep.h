@@ -57,6 +57,7 @@ template <class T>
 struct StretchLaw {
   T stiffness = 0;  // k, N/m; 0: no force
   T rest = 0;       // k L, N
+  T least = 0;      // N/m; negative: it pushes too
 };
 
 // max(f_b, c_b (l - L)) of a family of connections (eq. 3 to 5), as it depends on l.

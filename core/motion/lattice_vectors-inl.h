@@ -117,10 +117,12 @@ HWY_INLINE Each<V, N> inverse_sqrt(D d, const Each<V, N>& v) {
   return y;
 }
 
-// k (1 - L / l) where positive, N/m (eq. 2); y = 1 / l. NaN stays NaN, so that it is found.
+// k (1 - L / l), N/m, but not below law.least (eq. 2); y = 1 / l. NaN stays NaN, so that it is
+// found.
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE V stretch(D d, const StretchLaw<hn::TFromD<D>>& law, V y) {
-  return hn::Max(hn::Zero(d), hn::NegMulAdd(hn::Set(d, law.rest), y, hn::Set(d, law.stiffness)));
+  return hn::Max(hn::Set(d, law.least),
+                 hn::NegMulAdd(hn::Set(d, law.rest), y, hn::Set(d, law.stiffness)));
 }
 
 // table[i]: loads one by one, for gathers are slower.

@@ -158,7 +158,7 @@ Block jacobian_block(const Family& family, const Connection& connection, const M
                                     family.bend->function());
     return {i, j, direction, family.bend->slope(length), force / length};
   }
-  if (length < family.rest_length) return {i, j, direction, 0, 0};
+  if (length < family.rest_length && !family.pushes) return {i, j, direction, 0, 0};
   return {i, j, direction, family.stiffness, family.stiffness * (1 - family.rest_length / length)};
 }
 

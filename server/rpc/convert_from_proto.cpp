@@ -141,7 +141,12 @@ SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
 }
 
 BendingLaw Reader::bending(const v1::BendingLaw& from, const std::string& field) {
-  if (from.has_isometric()) return Isometric{};
+  if (from.has_isometric()) {
+    Isometric isometric;
+    if (from.isometric().has_resist_compression())
+      isometric.resist_compression = from.isometric().resist_compression();
+    return isometric;
+  }
   if (!from.has_choi_ko()) missing(field + ".law", "choi_ko or isometric", field + ".choi_ko.");
   const auto& law = from.choi_ko();
   ChoiKo choi_ko;

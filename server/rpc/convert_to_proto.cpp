@@ -58,7 +58,9 @@ void set(v1::BendingLaw* to, const ChoiKo& from) {
   law->set_diagonal_bend(from.diagonal_bend);
 }
 
-void set(v1::BendingLaw* to, const Isometric&) { to->mutable_isometric(); }
+void set(v1::BendingLaw* to, const Isometric& from) {
+  to->mutable_isometric()->set_resist_compression(from.resist_compression);
+}
 
 void set(v1::Textile* to, const MeasuredTextile& from) {
   v1::MeasuredTextile* measured = to->mutable_measured();

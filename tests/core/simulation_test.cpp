@@ -335,8 +335,8 @@ TEST(Simulation, AnotherChangeOfATextileBeginsWhereTheFirstHasCome) {
   EXPECT_EQ(stretch_of(simulation.scene().sheets[0].textile), 4 * stretch_of(given));
 }
 
-// Springs that are at once a quarter as stiff let the sheet fall; over many of its periods they let it
-// down.
+// Springs that are at once a quarter as stiff let the sheet fall; over many of its periods they let
+// it down.
 TEST(Simulation, ATextileThatChangesOverASecondDoesNotJerkTheSheet) {
   const auto largest_acceleration = [](double duration) {
     Simulation simulation = at_rest();

@@ -124,6 +124,8 @@ const Feature kFeatures[] = {
      }},
     {"ClampRules", [](SheetDefinition& s) { raw(s).bend = 0.1; }},
     {"Isometric", [](SheetDefinition& s) { s.bending = Isometric{}; }},
+    {"IsometricShortenedAtNoCost",
+     [](SheetDefinition& s) { s.bending = Isometric{.resist_compression = false}; }},
     {"IsometricMeasuredWithDrag",
      [](SheetDefinition& s) { s.textile = measured(20, 0.1, 1e-3), s.bending = Isometric{}; }},
     {"Measured", [](SheetDefinition& s) { s.textile = measured(20, 0, 1e-3); }},

@@ -8,6 +8,8 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
@@ -33,6 +35,8 @@ constexpr float kSunWidth = 0.07F;  // tangent of its radius
 
 // The ground under open sky has the colour of the horizon.
 constexpr float kGroundSun = 0.5F;
+// Brightness of the sky at the level, and how much more there is straight up.
+constexpr float kSkyLevel = 0.72F, kSkyRise = 0.28F;
 constexpr float kGroundNear = 2.2F, kGroundFar = 7;  // where it fades, radii
 
 const Colour kHorizon = colour_of("#e9eaec");
@@ -136,7 +140,7 @@ class Tracer::Rays {
       : stage_(stage),
         studio_(studio),
         device_(rtcNewDevice("threads=1")),  // so that a tree is always the same
-        scene_(device_ != nullptr ? rtcNewScene(device_) : nullptr),
+        scene_(device_ != nullptr ? rtcNewScene(device_.get()) : nullptr),
         up_(studio.directions.up.cast<float>()),
         radius_(static_cast<float>(studio.radius)),
         lift_(1e-4F * radius_) {
@@ -145,21 +149,14 @@ class Tracer::Rays {
         (2.4 * studio.directions.up + 1.1 * studio.directions.near - 1.2 * studio.directions.right)
             .normalized()
             .cast<float>();
-    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneFlags(scene_.get(), RTC_SCENE_FLAG_ROBUST);
     for (const Surface& surface : stage.surfaces) add(surface);
     for (const Body& body : stage.bodies) add(body);
     if (planes_.empty()) add_plane(studio.ground);
-    rtcCommitScene(scene_);
-    if (const RTCError error = rtcGetDeviceError(device_); error != RTC_ERROR_NONE)
+    rtcCommitScene(scene_.get());
+    if (const RTCError error = rtcGetDeviceError(device_.get()); error != RTC_ERROR_NONE)
       throw std::runtime_error("Embree cannot hold this frame: error " + std::to_string(error));
   }
-
-  ~Rays() {
-    rtcReleaseScene(scene_);
-    rtcReleaseDevice(device_);
-  }
-  Rays(const Rays&) = delete;
-  Rays& operator=(const Rays&) = delete;
 
   Vector3f local(const Eigen::Vector3d& place) const {
     return (place - studio_.centre).cast<float>();
@@ -172,7 +169,7 @@ class Tracer::Rays {
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    rtcIntersect1(scene_, &context, &ray);
+    rtcIntersect1(scene_.get(), &context, &ray);
 
     const Plane* plane = nullptr;
     float nearest = ray.ray.tfar;
@@ -221,14 +218,14 @@ class Tracer::Rays {
   }
 
   RTCGeometry geometry(RTCGeometryType type) {
-    RTCGeometry made = rtcNewGeometry(device_, type);
+    RTCGeometry made = rtcNewGeometry(device_.get(), type);
     if (made == nullptr) throw std::runtime_error("this Embree lacks a shape that Weft needs");
     return made;
   }
 
   void attach(RTCGeometry geometry) {
     rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene_, geometry);  // numbered from 0 in this order
+    rtcAttachGeometry(scene_.get(), geometry);  // numbered from 0 in this order
     rtcReleaseGeometry(geometry);
   }
 
@@ -293,7 +290,7 @@ class Tracer::Rays {
     aim(ray, from, direction);
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    rtcOccluded1(scene_, &context, &ray);
+    rtcOccluded1(scene_.get(), &context, &ray);
     return ray.tfar < 0;
   }
 
@@ -318,7 +315,7 @@ class Tracer::Rays {
     const Pair square = sample.next();
     const Vector3f towards = around(normal, disc(square), std::sqrt(1 - square.x));
     if (hidden(place + lift_ * face, towards)) return kBounce;
-    return 0.72F + 0.28F * towards.dot(up_);
+    return kSkyLevel + kSkyRise * towards.dot(up_);
   }
 
   // face: of the geometry, normal: smooth; both on the side of the camera.
@@ -364,7 +361,7 @@ class Tracer::Rays {
     const float sun = sun_on(place, plane.normal, plane.normal, 0, sample) / sun_.dot(up_);
     const float sky = sky_on(place, plane.normal, plane.normal, sample);
     // the mean of an open sky over the level
-    constexpr float kOpenSky = 0.72F + 0.28F * 2 / 3;
+    constexpr float kOpenSky = kSkyLevel + kSkyRise * 2 / 3;
     const float light = kGroundSun * sun + (1 - kGroundSun) * sky / kOpenSky;
     const Colour colour = kHorizon * light * (on_grid(plane, place) ? 0.86F : 1.0F);
     const float fade = smoothstep(kGroundNear, kGroundFar, place.norm() / radius_);
@@ -384,8 +381,12 @@ class Tracer::Rays {
 
   const Stage& stage_;
   const Studio& studio_;
-  RTCDevice device_;
-  RTCScene scene_;
+  struct Release {
+    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+  };
+  std::unique_ptr<RTCDeviceTy, Release> device_;
+  std::unique_ptr<RTCSceneTy, Release> scene_;
   Vector3f up_;
   Vector3f sun_;  // towards it
   float radius_;

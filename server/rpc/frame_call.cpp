@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "server/rpc/bytes.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/frame_encoding.h"

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/model/text.h"
+#include "server/rpc/bytes.h"
 
 namespace weft {
 namespace {
@@ -132,15 +133,6 @@ v1::StreamFramesResponse message_of(const Frame& frame, const v1::FrameFormat& f
   return message;
 }
 
-// A buffer that owns the bytes.
-grpc::ByteBuffer buffer_of(std::string bytes) {
-  auto* owned = new std::string(std::move(bytes));
-  const grpc::Slice slice(
-      owned->data(), owned->size(), [](void* string) { delete static_cast<std::string*>(string); },
-      owned);
-  return {&slice, 1};
-}
-
 }  // namespace
 
 v1::FrameFormat with_defaults(v1::FrameFormat format) {
@@ -203,10 +195,6 @@ grpc::ByteBuffer encoded_frame(const Frame& frame, const v1::FrameFormat& format
     return Encoding{buffer, buffer->Length()};
   });
   return *static_cast<const grpc::ByteBuffer*>(encoding.get());  // shares the bytes
-}
-
-grpc::ByteBuffer encoded(const v1::StreamFramesResponse& message) {
-  return buffer_of(message.SerializeAsString());
 }
 
 }  // namespace weft

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <grpcpp/impl/codegen/proto_utils.h>
 #include <grpcpp/support/byte_buffer.h>
 
 #include <cstdint>
@@ -25,15 +24,5 @@ std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t p
 
 // The message with this frame; its bytes are made once and shared by all who ask.
 grpc::ByteBuffer encoded_frame(const Frame& frame, const v1::FrameFormat& format);
-
-// Any other message.
-grpc::ByteBuffer encoded(const v1::StreamFramesResponse& message);
-
-// False where the bytes are no such message.
-template <class Message>
-bool decode(const grpc::ByteBuffer& bytes, Message& message) {
-  grpc::ByteBuffer read(bytes);
-  return grpc::SerializationTraits<Message>::Deserialize(&read, &message).ok();
-}
 
 }  // namespace weft

@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "server/rpc/bytes.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/frame_encoding.h"
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "server/rpc/bytes.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/names.h"
@@ -94,7 +95,12 @@ void Interaction::OnReadDone(bool ok) {
     // what waits is carried out first
     if (!ending_) ending_ = grpc::Status::OK;
   } else if (!ending_) {
-    if (const auto status = take(request_); !status.ok()) end(status);
+    v1::InteractRequest request;
+    const auto status = decode(request_, request)
+                            ? take(request)
+                            : errors::message_malformed("weft.v1.InteractRequest");
+    request_.Clear();
+    if (!status.ok()) end(status);
   }
   act(lock);
 }
@@ -152,8 +158,10 @@ void Interaction::act(std::unique_lock<std::mutex>& lock) {
         self->end(to_status_of_stream(*refusal, *self->session_));
         return self->act(locked);
       }
-      self->response_.set_sequence(sequence);
-      self->response_.set_applied_frame(std::get<Applied>(outcome).frame);
+      v1::InteractResponse response;
+      response.set_sequence(sequence);
+      response.set_applied_frame(std::get<Applied>(outcome).frame);
+      self->response_ = encoded(response);
       self->StartWrite(&self->response_);
     };
     return submit(lock, std::move(batch.actions), done);

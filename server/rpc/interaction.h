@@ -1,5 +1,6 @@
 #pragma once
 
+#include <grpcpp/support/byte_buffer.h>
 #include <grpcpp/support/server_callback.h>
 
 #include <cstddef>
@@ -38,7 +39,7 @@ class Interactions {
 // One call of Interact: a hand. One batch of actions at a time is with the session; what comes
 // meanwhile waits for its answer to have left, newer drags in the place of older ones. Lives until
 // OnDone.
-class Interaction final : public grpc::ServerBidiReactor<v1::InteractRequest, v1::InteractResponse>,
+class Interaction final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
                           public std::enable_shared_from_this<Interaction> {
  public:
   Interaction(Backend& backend, Interactions& interactions)
@@ -76,8 +77,7 @@ class Interaction final : public grpc::ServerBidiReactor<v1::InteractRequest, v1
   std::shared_ptr<Interaction> self_;  // until OnDone
 
   std::mutex mutex_;  // guards all below
-  v1::InteractRequest request_;
-  v1::InteractResponse response_;
+  grpc::ByteBuffer request_, response_;
   std::shared_ptr<Session> session_;
   int hand_ = 0;
   std::int64_t sequence_ = 0;  // of the latest message

@@ -252,7 +252,7 @@ grpc::ServerUnaryReactor* SessionService::ApplyActions(grpc::CallbackServerConte
                 [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
 }
 
-grpc::ServerBidiReactor<v1::InteractRequest, v1::InteractResponse>* SessionService::Interact(
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* SessionService::Interact(
     grpc::CallbackServerContext*) {
   const auto interaction = std::make_shared<Interaction>(backend_, interactions_);
   interaction->start();

@@ -11,10 +11,23 @@
 
 namespace weft {
 
+// Messages of Interact pass as bytes: gRPC would show those it cannot decode as the stream's end.
+using SessionMethods = v1::SessionService::WithCallbackMethod_CreateSession<
+    v1::SessionService::WithCallbackMethod_GetSession<
+        v1::SessionService::WithCallbackMethod_ListSessions<
+            v1::SessionService::WithCallbackMethod_DeleteSession<
+                v1::SessionService::WithCallbackMethod_UpdateTextile<
+                    v1::SessionService::WithCallbackMethod_StepSession<
+                        v1::SessionService::WithCallbackMethod_RunSession<
+                            v1::SessionService::WithCallbackMethod_PauseSession<
+                                v1::SessionService::WithCallbackMethod_ApplyActions<
+                                    v1::SessionService::WithRawCallbackMethod_Interact<
+                                        v1::SessionService::Service>>>>>>>>>>;
+
 // Why a session did not carry a command out.
 grpc::Status to_status(const Refusal& refusal, const Session& session);
 
-class SessionService final : public v1::SessionService::CallbackService {
+class SessionService final : public SessionMethods {
  public:
   explicit SessionService(Backend& backend) : backend_(backend) {}
 
@@ -46,7 +59,7 @@ class SessionService final : public v1::SessionService::CallbackService {
   grpc::ServerUnaryReactor* ApplyActions(grpc::CallbackServerContext* context,
                                          const v1::ApplyActionsRequest* request,
                                          v1::ApplyActionsResponse* response) override;
-  grpc::ServerBidiReactor<v1::InteractRequest, v1::InteractResponse>* Interact(
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Interact(
       grpc::CallbackServerContext* context) override;
 
   // Answers every creation and ends every interaction under way: the server is going down.

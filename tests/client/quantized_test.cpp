@@ -4,6 +4,7 @@
 #include <random>
 
 #include "client/recording/points.h"
+#include "server/rpc/bytes.h"
 #include "server/rpc/frame_encoding.h"
 
 // What the server packs with FRAME_ENCODING_QUANTIZED_ZSTD and the client unpacks.

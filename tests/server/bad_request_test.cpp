@@ -293,7 +293,7 @@ void walk(Message& message, const std::string& path, const Visit& visit) {
 // Fields outside of scenes to which any number or text may be right.
 bool may_take(const FieldDescriptor& field) {
   static const std::set<std::string> any = {"expected_frame", "until_frame", "start_frame",
-                                            "end_frame", "request_id"};
+                                            "end_frame",      "request_id",  "sequence"};
   return any.contains(field.name());
 }
 
@@ -370,6 +370,7 @@ std::vector<std::string> known_requests(const std::string& type) {
       {"StepSessionRequest", "name: 'sessions/it' frames: 2 expected_frame: 0"},
       {"RunSessionRequest", "name: 'sessions/it' time_scale: 2 until_frame: 3 until_rest: true"},
       {"PauseSessionRequest", "name: 'sessions/it'"},
+      {"InteractRequest", "session: 'sessions/it' sequence: 1 action { grab { particle: 3 } }"},
       {"StreamFramesRequest",
        "session: 'sessions/it' start_frame: 0 end_frame: 0 format { encoding: "
        "FRAME_ENCODING_FLOAT64 "
@@ -501,8 +502,6 @@ std::vector<const MethodDescriptor*> methods() {
         v1::Textile::descriptor()->file()}) {
     for (int i = 0; i < file->service_count(); ++i) {
       for (int k = 0; k < file->service(i)->method_count(); ++k) {
-        // gRPC shows messages that it cannot decode as the end of the stream
-        if (file->service(i)->method(k)->name() == "Interact") continue;
         methods.push_back(file->service(i)->method(k));
       }
     }

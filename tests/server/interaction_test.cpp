@@ -188,6 +188,8 @@ TEST(Interact, EndsWithAServerThatDrainsAndRefusesNonsense) {
   hand.answer();
   confused.send(session, 0, grab(8));
   EXPECT_THAT(confused.finish().fields(), ElementsAre("sequence"));
+  EXPECT_EQ(raw_call(service, "/weft.v1.SessionService/Interact", "\xff\xff").second.reason(),
+            "MESSAGE_MALFORMED");
   const std::jthread reader([&] { EXPECT_EQ(hand.finish().reason(), "SERVER_DRAINING"); });
   service.server.stop();
 }

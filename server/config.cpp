@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
 #include <variant>
 #include <vector>
 
@@ -28,19 +29,56 @@ struct Number {
 std::vector<Number> numbers(Config& config) {
   ServerOptions& server = config.server;
   Limits& limits = server.limits;
-  constexpr std::int64_t kMiB = 1 << 20;
+  constexpr std::int64_t kMiB = 1 << 20, kMostParticles = 1'000'000'000;
   return {
       {"port", &server.port, 0, 65535, "Port to listen on; 0 takes a free one"},
       {"workers", &server.worker_threads, 1, 1024, "Threads that advance sessions"},
       {"max_sessions", &limits.max_sessions, 1, 100'000, "Sessions at a time"},
-      {"max_particles", &limits.max_particles_per_session, 4, 1'000'000'000,
+      {"max_sessions_per_principal", &limits.max_sessions_per_principal, 1, 100'000,
+       "Sessions of one principal at a time"},
+      {"max_particles", &limits.max_particles_per_session, 4, kMostParticles,
        "Particles in one session"},
+      {"max_particles_per_principal", &limits.max_particles_per_principal, 4, kMostParticles,
+       "Particles in all sessions of one principal"},
+      {"max_total_particles", &limits.max_total_particles, 4, kMostParticles,
+       "Particles in all sessions"},
       {"max_streams", &limits.max_streams, 1, 100'000, "Streams at a time"},
+      {"max_streams_per_principal", &limits.max_streams_per_principal, 1, 100'000,
+       "Streams of one principal at a time"},
       {"max_tests", &limits.max_tests, 1, 256, "Tests of textiles at a time"},
       {"history_bytes", &limits.history_bytes_per_session, kMiB, 1024 * kMiB * 64,
        "Bytes of frames that a session keeps for its streams"},
       {"snapshot_ms", &server.snapshot_ms, 0, 3'600'000,
        "Milliseconds of computing that a session writes a snapshot after, which restarts begin at"},
+  };
+}
+
+struct TlsOptions {
+  std::optional<std::string> certificate, key, client_ca;
+};
+
+// A path or an address that a flag and a key of the file set; "data_dir" is --data-dir.
+struct Text {
+  const char* key;
+  std::optional<std::string>* target;
+  const char* type;
+  std::string help;
+};
+
+// With those of `tls`, which set_tls puts together.
+std::vector<Text> texts(Config& config, TlsOptions& tls) {
+  ServerOptions& server = config.server;
+  return {
+      {"host", &server.host, "ADDRESS", "Address to listen on [" + *server.host + "]"},
+      {"metrics", &server.metrics, "ADDRESS",
+       "Address and port to serve Prometheus' metrics at, or none"},
+      {"data_dir", &server.data_dir, "DIR", "Directory that keeps sessions, or none"},
+      {"tls_cert", &tls.certificate, "FILE", "Certificate chain (PEM): encrypts, needs --tls-key"},
+      {"tls_key", &tls.key, "FILE", "Its key (PEM, no passphrase)"},
+      {"tls_client_ca", &tls.client_ca, "FILE",
+       "Certificates (PEM): clients need one that these signed, which says who they are"},
+      {"tokens", &server.tokens, "FILE",
+       "Who may call: lines PRINCIPAL SHA256 [admin], as weft token writes them"},
   };
 }
 
@@ -74,7 +112,7 @@ Value value_of(const toml::node& node, const std::string& where, const char* typ
   refuse(where + " is not " + type);
 }
 
-void read_file(const std::string& path, Config& config) {
+void read_file(const std::string& path, Config& config, TlsOptions& tls) {
   if (!std::filesystem::is_regular_file(path)) refuse(path + " is no file");
   toml::table table;
   try {
@@ -85,25 +123,25 @@ void read_file(const std::string& path, Config& config) {
            std::string(error.description()));
   }
   const auto known = numbers(config);
+  const auto known_texts = texts(config, tls);
   for (const auto& [name, node] : table) {
     const std::string key(name.str());
     const std::string where = path + ":" + std::to_string(node.source().begin.line) + ": " + key;
     const auto number = std::find_if(known.begin(), known.end(),
                                      [&](const Number& each) { return each.key == key; });
+    const auto text = std::find_if(known_texts.begin(), known_texts.end(),
+                                   [&](const Text& each) { return each.key == key; });
     if (number != known.end()) {
       set(*number, value_of<std::int64_t>(node, where, "a whole number"), where);
-    } else if (key == "host") {
-      config.server.host = value_of<std::string>(node, where, "a text");
-    } else if (key == "metrics") {
-      config.server.metrics = value_of<std::string>(node, where, "a text");
-    } else if (key == "data_dir") {
-      config.server.data_dir = value_of<std::string>(node, where, "a text");
+    } else if (text != known_texts.end()) {
+      *text->target = value_of<std::string>(node, where, "a text");
     } else if (key == "insecure") {
       config.insecure = value_of<bool>(node, where, "true or false");
     } else if (key == "log_level") {
       set_log_level(config, value_of<std::string>(node, where, "a text"), where);
     } else {
-      std::string keys = "host, metrics, data_dir, insecure, log_level";
+      std::string keys = "insecure, log_level";
+      for (const auto& each : known_texts) keys += std::string(", ") + each.key;
       for (const auto& each : known) keys += std::string(", ") + each.key;
       refuse(where + " is not known; there are " + keys);
     }
@@ -122,17 +160,18 @@ std::string default_data_dir() {
   return "/var/lib/weft";
 }
 
-bool is_loopback(const std::string& host) {
-  const bool number = host.find_first_not_of("0123456789.") == std::string::npos;
-  return host == "localhost" || host == "[::1]" || (number && host.starts_with("127."));
+void check_reach(const std::string& key, const std::string& value, const std::string& host,
+                 const std::string& way_out) {
+  if (is_loopback(host)) return;
+  refuse(key + " is " + value + ", which other machines can reach, and nothing is encrypted; " +
+         way_out + " --insecure if that is what you want");
 }
 
-void check_reach(const std::string& key, const std::string& value, const std::string& host,
-                 const Config& config) {
-  if (is_loopback(host) || config.insecure) return;
-  refuse(key + " is " + value +
-         ", which other machines can reach, and nothing is encrypted; add --insecure if that is "
-         "what you want");
+void set_tls(Config& config, const TlsOptions& given) {
+  if (!given.certificate && !given.key && !given.client_ca) return;
+  if (!given.certificate || !given.key)
+    refuse("tls_cert and tls_key are needed for TLS, one is missing");
+  config.server.tls = ServerTls{*given.certificate, *given.key, given.client_ca};
 }
 
 // "HOST:PORT", or none.
@@ -145,10 +184,15 @@ void check_metrics(Config& config) {
                       port.find_first_not_of("0123456789") == std::string::npos;
   if (colon == 0 || !digits || std::stoi(port) > 65535)
     refuse("metrics is \"" + *metrics + "\", not an address and a port like 127.0.0.1:9464");
-  check_reach("metrics", *metrics, metrics->substr(0, colon), config);
+  if (!config.insecure) check_reach("metrics", *metrics, metrics->substr(0, colon), "add");
 }
 
 }  // namespace
+
+bool is_loopback(const std::string& host) {
+  const bool number = host.find_first_not_of("0123456789.") == std::string::npos;
+  return host == "localhost" || host == "[::1]" || (number && host.starts_with("127."));
+}
 
 Config read_config(int argc, const char* const* argv) {
   Config config;
@@ -157,16 +201,17 @@ Config read_config(int argc, const char* const* argv) {
 
   CLI::App app("weftd - the Weft server: simulates textiles and streams their frames over gRPC.",
                "weftd");
-  std::string file, host, metrics, data_dir, log_level;
+  std::string file, log_level;
   bool insecure = false;
   app.add_option("--config", file, "TOML file; its keys are the flags below, with _ for -")
       ->type_name("FILE");
-  app.add_option("--host", host, "Address to listen on [" + *config.server.host + "]")
-      ->type_name("ADDRESS");
-  app.add_option("--metrics", metrics, "Address and port to serve Prometheus' metrics at, or none")
-      ->type_name("ADDRESS");
-  app.add_option("--data-dir", data_dir, "Directory that keeps sessions, or none")
-      ->type_name("DIR");
+  TlsOptions tls;
+  const auto known_texts = texts(config, tls);
+  std::vector<std::string> given_texts(known_texts.size());
+  for (std::size_t i = 0; i < known_texts.size(); ++i) {
+    app.add_option(flag_of(known_texts[i].key), given_texts[i], known_texts[i].help)
+        ->type_name(known_texts[i].type);
+  }
   app.add_flag("--insecure", insecure, "Allow a host other machines can reach, unencrypted");
   app.add_option("--log-level", log_level, "trace, debug, info, warn, error or off [info]")
       ->type_name("LEVEL");
@@ -182,7 +227,12 @@ Config read_config(int argc, const char* const* argv) {
   app.footer(
       "Prints \"weftd listening on ADDRESS:PORT\" when it serves; logs to stderr. SIGTERM or\n"
       "SIGINT ends every stream and call and exits with 0. Sessions are kept, unless told\n"
-      "otherwise, in $STATE_DIRECTORY, $XDG_STATE_HOME/weft or ~/.local/state/weft.");
+      "otherwise, in $STATE_DIRECTORY, $XDG_STATE_HOME/weft or ~/.local/state/weft.\n"
+      "\n"
+      "Files of TLS are read anew within seconds of a change; while certificate and key do not\n"
+      "belong together, no new connection is taken. Tokens are read once, at the start. With\n"
+      "--tokens or --tls-client-ca, sessions are their principal's: whom a token names or, where\n"
+      "none is sent, the common name of the client's certificate.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
@@ -194,20 +244,21 @@ Config read_config(int argc, const char* const* argv) {
   }
 
   // flags last, so that they win
-  if (!file.empty()) read_file(file, config);
+  if (!file.empty()) read_file(file, config, tls);
   for (std::size_t i = 0; i < known.size(); ++i) {
     const std::string flag = flag_of(known[i].key);
     if (app.count(flag) > 0) set(known[i], values[i], flag);
   }
-  if (app.count("--host") > 0) config.server.host = host;
+  for (std::size_t i = 0; i < known_texts.size(); ++i)
+    if (app.count(flag_of(known_texts[i].key)) > 0) *known_texts[i].target = given_texts[i];
   config.insecure |= insecure;
-  if (app.count("--metrics") > 0) config.server.metrics = metrics;
+  set_tls(config, tls);
   if (config.server.metrics) check_metrics(config);
-  if (app.count("--data-dir") > 0) config.server.data_dir = data_dir;
   if (config.server.data_dir->empty()) refuse("data_dir is empty; give a directory, or none");
   if (*config.server.data_dir == "none") config.server.data_dir.reset();
   if (app.count("--log-level") > 0) set_log_level(config, log_level, "--log-level");
-  check_reach("host", *config.server.host, *config.server.host, config);
+  if (!config.insecure && !config.server.tls)
+    check_reach("host", *config.server.host, *config.server.host, "give --tls-cert, or add");
   return config;
 }
 

@@ -13,6 +13,9 @@ struct Config {
   std::string log_level = "info";
 };
 
+// Whether only this machine reaches the host, "127.0.0.1".
+bool is_loopback(const std::string& host);
+
 // What ends weftd before it begins: something to print, and the exit code.
 struct ConfigExit {
   std::string text;

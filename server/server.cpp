@@ -56,13 +56,14 @@ struct Server::Parts {
   explicit Parts(const ServerOptions& options)
       : backend(options.limits, options.worker_threads,
                 std::chrono::milliseconds(options.snapshot_ms),
-                options.data_dir ? open_sqlite_store(*options.data_dir) : make_no_store()) {}
+                options.data_dir ? open_sqlite_store(*options.data_dir) : make_no_store(),
+                Access(options.tokens, options.tls && options.tls->client_ca)) {}
 
   Backend backend;
   SessionService sessions{backend};
   FrameService frames{backend};
   ServerService server{backend};
-  TextileService textiles;
+  TextileService textiles{backend.access};
   LabService lab{backend};
   std::unique_ptr<grpc::Server> grpc;
   std::optional<Metrics> metrics;
@@ -82,7 +83,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
   int port = 0;
   if (options.host) {
     builder.AddListeningPort(*options.host + ":" + std::to_string(options.port),
-                             grpc::InsecureServerCredentials(), &port);
+                             make_credentials(options.tls), &port);
   }
   parts_->grpc = builder.BuildAndStart();
   if (!parts_->grpc || (options.host && port == 0)) {

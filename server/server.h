@@ -8,6 +8,7 @@
 #include <string>
 #include <thread>
 
+#include "server/credentials.h"
 #include "server/session/limits.h"
 
 namespace weft {
@@ -18,6 +19,8 @@ struct ServerOptions {
   int worker_threads = static_cast<int>(std::thread::hardware_concurrency());
   std::optional<std::string> metrics;   // "127.0.0.1:9464"; absent: none
   std::optional<std::string> data_dir;  // where sessions are kept; absent: they end with the server
+  std::optional<ServerTls> tls;         // absent: unencrypted
+  std::optional<std::string> tokens;    // file of Access; absent: nobody needs one
   int snapshot_ms = 2000;               // SessionHost::snapshot_after
   Limits limits;
 };
@@ -26,7 +29,7 @@ struct ServerOptions {
 class Server {
  public:
   // Serves once constructed, with the sessions that were kept. Throws std::runtime_error where the
-  // address or the data directory cannot be had.
+  // address, the data directory or a file cannot be had.
   explicit Server(const ServerOptions& options);
   ~Server();  // stops
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "server/rpc/access.h"
 #include "server/rpc/open_calls.h"
 #include "server/rpc/requests.h"
 #include "server/session/limits.h"
@@ -17,26 +18,40 @@
 
 namespace weft {
 
+// Who calls a stream, and his share of them.
+struct StreamCaller {
+  Caller caller;
+  Quota::Share share;
+};
+
 // What the services share. The registry goes first, while sessions can still reach the scheduler.
 // Scenes are planned on a thread of their own, so that a large one holds up no session.
 struct Backend {
   Backend(const Limits& given, int threads, std::chrono::milliseconds snapshots_after,
-          std::unique_ptr<SessionStore> sessions)
+          std::unique_ptr<SessionStore> sessions, Access callers)
       : limits(given),
         worker_threads(threads),
         snapshot_after(snapshots_after),
+        access(std::move(callers)),
+        streams({"streams", given.max_streams},
+                {"streams_per_principal", given.max_streams_per_principal}),
         scheduler(threads),
         store(std::move(sessions)),
-        registry(static_cast<std::size_t>(given.max_sessions)) {}
+        registry(given) {}
 
   SessionHost host() {
     return {scheduler, stats, static_cast<std::size_t>(limits.history_bytes_per_session),
             [](const std::string& line) { spdlog::warn(line); }, snapshot_after};
   }
 
+  // The caller of a stream, or why there is none.
+  std::variant<StreamCaller, grpc::Status> admit(const grpc::ServerContextBase& context);
+
   const Limits limits;
   const int worker_threads;
   const std::chrono::milliseconds snapshot_after;
+  const Access access;
+  Quota streams;
   std::atomic<bool> draining = false;  // sessions are not created or changed any more
   OpenCalls calls;
   Requests requests;

@@ -179,6 +179,7 @@ v1::Session to_proto(const Session& session, StartValues start_values) {
   result.set_failure(status.failure);
   result.set_lateness_s(status.lateness.count());
   result.set_numerics_id(session.numerics_id());
+  result.set_owner(session.owner());
   for (const auto& repair : status.repairs) *result.add_repairs() = to_proto(repair);
   const auto since_epoch = session.create_time().time_since_epoch();
   *result.mutable_create_time() = google::protobuf::util::TimeUtil::NanosecondsToTimestamp(

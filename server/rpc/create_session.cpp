@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <new>
 #include <utility>
 
@@ -11,10 +12,14 @@
 namespace weft {
 namespace {
 
-std::int64_t particles_of(const Scene& scene) {
+// Without sheets that are larger than any that is simulated.
+std::int64_t particles_of(const v1::Scene& scene) {
+  constexpr std::int64_t kMostRows = 4096;
   std::int64_t particles = 0;
-  for (const auto& sheet : scene.sheets) {
-    particles += std::int64_t{sheet.grid.rows} * sheet.grid.columns;
+  for (const auto& sheet : scene.sheets()) {
+    const std::int64_t rows = sheet.grid().rows(), columns = sheet.grid().columns();
+    if (std::min(rows, columns) > 0 && std::max(rows, columns) <= kMostRows)
+      particles += rows * columns;
   }
   return particles;
 }
@@ -36,17 +41,13 @@ grpc::Status refused_step(const Simulation& simulation, const StepRefusal& refus
   return errors::step_unstable(refusal, solver + (asked ? "substep_s" : "integrator"));
 }
 
-grpc::Status refused(Registry::Refused refused, const std::string& id, const Limits& limits) {
-  switch (refused) {
-    case Registry::Refused::kExists:
-      return errors::session_exists(session_name(id));
-    case Registry::Refused::kFull:
-      return errors::exhausted(
-          "sessions",
-          "the server holds " + std::to_string(limits.max_sessions) + " sessions, its most", true);
-    case Registry::Refused::kClosed:
-      break;
+grpc::Status refused(const Registry::Refused& refused, const Caller& caller,
+                     const std::string& id) {
+  if (const auto* exists = std::get_if<Registry::Exists>(&refused)) {
+    return caller.may_use(exists->owner) ? errors::session_exists(session_name(id))
+                                         : errors::session_not_yours(session_name(id));
   }
+  if (const auto* excess = std::get_if<Quota::Excess>(&refused)) return errors::exhausted(*excess);
   return errors::server_draining();
 }
 
@@ -55,9 +56,9 @@ grpc::Status refused(Registry::Refused refused, const std::string& id, const Lim
 // A call whose scene is being planned; answered once, by the planner or by a server that goes down.
 class SessionService::Creation {
  public:
-  Creation(const v1::CreateSessionRequest& asked, v1::Session* response,
+  Creation(Caller who, const v1::CreateSessionRequest& asked, v1::Session* response,
            grpc::ServerUnaryReactor* reactor)
-      : request(asked), response_(response), reactor_(reactor) {}
+      : caller(std::move(who)), request(asked), response_(response), reactor_(reactor) {}
 
   void answer(const grpc::Status& status, v1::Session session = {}) {
     std::lock_guard lock(mutex_);
@@ -66,6 +67,7 @@ class SessionService::Creation {
     std::exchange(reactor_, nullptr)->Finish(status);
   }
 
+  const Caller caller;
   const v1::CreateSessionRequest request;  // a copy: it may outlive the call
 
  private:
@@ -74,11 +76,15 @@ class SessionService::Creation {
   grpc::ServerUnaryReactor* reactor_;  // null: answered
 };
 
-bool SessionService::begin(const std::shared_ptr<Creation>& creation) {
+grpc::Status SessionService::begin(const std::shared_ptr<Creation>& creation) {
+  // what a full server refuses does not wait for the plans of others
+  const auto& request = creation->request;
+  if (auto status = refusal(creation->caller, request, request.session_id()); !status.ok())
+    return status;
   std::lock_guard lock(mutex_);
-  if (backend_.draining) return false;
+  if (backend_.draining) return errors::server_draining();
   creations_.insert(creation);
-  return true;
+  return grpc::Status::OK;
 }
 
 void SessionService::end(const std::shared_ptr<Creation>& creation) {
@@ -93,19 +99,25 @@ void SessionService::drain() {
 }
 
 // Planning a scene takes its time: not on a thread of gRPC's.
-grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext*,
+grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
                                                         const v1::CreateSessionRequest* request,
                                                         v1::Session* response) {
   auto* reactor = new UnaryCall(backend_.calls);
-  const auto creation = std::make_shared<Creation>(*request, response, reactor);
-  if (!begin(creation)) {
-    creation->answer(errors::server_draining());
+  const auto caller = backend_.access.caller(*context);
+  if (const auto* error = std::get_if<grpc::Status>(&caller)) {
+    reactor->Finish(*error);
+    return reactor;
+  }
+  const auto creation =
+      std::make_shared<Creation>(std::get<Caller>(caller), *request, response, reactor);
+  if (const auto status = begin(creation); !status.ok()) {
+    creation->answer(status);
     return reactor;
   }
   const bool posted = backend_.planner.post([this, creation] {
     try {
       v1::Session session;
-      const grpc::Status status = create(creation->request, session);
+      const grpc::Status status = create(creation->caller, creation->request, session);
       creation->answer(status, std::move(session));
     } catch (const std::bad_alloc&) {
       creation->answer(
@@ -120,7 +132,21 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
   return reactor;
 }
 
-grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
+// Whether the session, or what the request made before, could be had; its scene is not looked at.
+grpc::Status SessionService::refusal(const Caller& caller, const v1::CreateSessionRequest& request,
+                                     const std::string& id) const {
+  if (request.validate_only()) return grpc::Status::OK;
+  const auto named = named_request(caller, request, request.request_id());
+  if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
+  const auto known = backend_.requests.find(std::get<Request>(named));
+  if (const auto* error = std::get_if<grpc::Status>(&known)) return *error;
+  if (std::get<std::optional<std::string>>(known)) return grpc::Status::OK;
+  const std::int64_t particles = particles_of(request.session().scene());
+  const auto reason = backend_.registry.refusal(id, caller.principal, particles);
+  return reason ? refused(*reason, caller, id) : grpc::Status::OK;
+}
+
+grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessionRequest& request,
                                     v1::Session& response) {
   if (!request.session_id().empty() && !is_session_id(request.session_id())) {
     return errors::field_invalid("session_id", "\"" + request.session_id() +
@@ -131,7 +157,7 @@ grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
     return errors::field_invalid("session.scene", "is absent");
   }
 
-  const auto named = named_request(request, request.request_id());
+  const auto named = named_request(caller, request, request.request_id());
   if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
   const Request& name = std::get<Request>(named);
   const auto known = backend_.requests.find(name);
@@ -146,24 +172,20 @@ grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
     return errors::field_invalid(*problems);
   }
   Scene& scene = std::get<Scene>(converted);
-  const std::int64_t particles = particles_of(scene);
+  const std::int64_t particles = particles_of(request.session().scene());
   if (particles > backend_.limits.max_particles_per_session) {
-    return errors::exhausted("particles",
+    return errors::exhausted("particles_per_session",
                              "the scene has " + std::to_string(particles) +
                                  " particles; a session may have " +
                                  std::to_string(backend_.limits.max_particles_per_session),
                              false);
   }
   const std::string id = request.session_id().empty() ? make_session_id() : request.session_id();
-  if (!request.validate_only()) {
-    if (const auto reason = backend_.registry.refusal(id)) {
-      return refused(*reason, id, backend_.limits);
-    }
-  }
+  if (auto status = refusal(caller, request, id); !status.ok()) return status;
 
   Simulation simulation(std::move(scene));
   if (const auto refusal = simulation.refusal()) return refused_step(simulation, *refusal);
-  const SessionIdentity identity = make_identity(id, numerics_id());
+  const SessionIdentity identity = make_identity(id, numerics_id(), caller.principal);
   const auto session = std::make_shared<Session>(identity, std::move(simulation), backend_.host(),
                                                  backend_.store->log_of(identity.uid, 0));
   response = to_proto(*session);
@@ -172,6 +194,7 @@ grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
     response.clear_uid();
     response.clear_create_time();
     response.clear_numerics_id();
+    response.clear_owner();
     return grpc::Status::OK;
   }
   try {
@@ -181,7 +204,7 @@ grpc::Status SessionService::create(const v1::CreateSessionRequest& request,
   }
   if (const auto reason = backend_.registry.add(session)) {
     backend_.store->erase(identity.uid, {}, [](const std::string&) {});
-    return refused(*reason, id, backend_.limits);
+    return refused(*reason, caller, id);
   }
   backend_.requests.remember(name, session->uid());
   return grpc::Status::OK;

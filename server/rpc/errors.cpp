@@ -126,6 +126,13 @@ grpc::Status session_not_found(const std::string& name) {
   return to_grpc(status);
 }
 
+grpc::Status session_not_yours(const std::string& name) {
+  auto status = make(grpc::StatusCode::PERMISSION_DENIED, "SESSION_NOT_YOURS",
+                     name + " is another's, or there is none");
+  add_resource(status, "Session", name);
+  return to_grpc(status);
+}
+
 grpc::Status session_exists(const std::string& name) {
   auto status =
       make(grpc::StatusCode::ALREADY_EXISTS, "SESSION_EXISTS", "there is a session " + name);
@@ -185,6 +192,19 @@ grpc::Status exhausted(const std::string& subject, const std::string& message, b
   status.add_details()->PackFrom(quota);
   if (retry) add_retry(status);
   return to_grpc(status);
+}
+
+grpc::Status exhausted(const Quota::Excess& excess) {
+  const auto& bound = excess.bound;
+  std::string what = bound.name;
+  std::replace(what.begin(), what.end(), '_', ' ');
+  return exhausted(bound.name,
+                   "the server holds no more than " + std::to_string(bound.most) + " " + what,
+                   !excess.for_ever);
+}
+
+grpc::Status unauthenticated(const std::string& reason, const std::string& message) {
+  return to_grpc(make(grpc::StatusCode::UNAUTHENTICATED, reason, message));
 }
 
 grpc::Status store_unwritable(const std::string& why) {

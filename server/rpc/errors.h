@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/simulation.h"
+#include "server/session/quota.h"
 #include "server/session/subscription.h"
 
 // Every error of the service in one place: code, reason, details. Each carries google.rpc.ErrorInfo
@@ -28,6 +29,8 @@ grpc::Status request_used();
 grpc::Status message_malformed(const std::string& type);
 
 grpc::Status session_not_found(const std::string& name);
+// Whether there is such a session is not told.
+grpc::Status session_not_yours(const std::string& name);
 grpc::Status session_exists(const std::string& name);
 grpc::Status session_damaged(const std::string& name, const std::string& why);
 grpc::Status textile_not_found(const std::string& name);
@@ -43,6 +46,11 @@ grpc::Status solver_failed(const std::string& failure, std::int64_t latest_frame
 
 // Something the server has only so much of. `subject` names it, such as "sessions".
 grpc::Status exhausted(const std::string& subject, const std::string& message, bool retry);
+
+grpc::Status exhausted(const Quota::Excess& excess);
+
+// A call of nobody that the server knows.
+grpc::Status unauthenticated(const std::string& reason, const std::string& message);
 
 // A call that could not be written down, and was not carried out.
 grpc::Status store_unwritable(const std::string& why);

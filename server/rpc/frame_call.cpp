@@ -19,16 +19,23 @@ static_assert(int{Viewed::kHeaderFieldNumber} == int{Streamed::kHeaderFieldNumbe
               int{Viewed::kFrameFieldNumber} == int{Streamed::kFrameFieldNumber} &&
               int{Viewed::kProgressFieldNumber} == int{Streamed::kProgressFieldNumber});
 
-bool FrameCall::begin() {
+bool FrameCall::begin(const grpc::ServerContextBase& context) {
   self_ = shared_from_this();
-  const auto status = streams_.add(self_);
+  auto admitted = backend_.admit(context);
+  grpc::Status status;
+  if (const auto* error = std::get_if<grpc::Status>(&admitted)) {
+    status = *error;
+  } else {
+    caller_ = std::get<StreamCaller>(std::move(admitted));
+    status = streams_.add(self_);
+  }
   if (!status.ok()) finish(status);
   return status.ok();
 }
 
 grpc::Status FrameCall::find(const std::string& name, const std::string& uid,
                              const v1::FrameFormat& format, std::vector<Problem> problems) {
-  const auto found = find_session(backend_.registry, name, "session");
+  const auto found = find_session(backend_.registry, caller_.caller, name, "session");
   if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
   name_ = name;
   session_ = std::get<std::shared_ptr<Session>>(found);

@@ -38,7 +38,8 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   void on_done();
 
   // all below with the mutex held
-  bool begin();  // first; false where the server has too many calls and this one is finished
+  // First; false where the call is not taken, and finished.
+  bool begin(const grpc::ServerContextBase& context);
   // The session and format asked for, or why there are none; more `problems` may be known.
   grpc::Status find(const std::string& name, const std::string& uid, const v1::FrameFormat& format,
                     std::vector<Problem> problems);
@@ -73,6 +74,7 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   OpenCalls::Ticket ticket_;
   std::shared_ptr<FrameCall> self_;  // until the reactor is done
 
+  StreamCaller caller_;
   std::string name_;  // of the session
   v1::FrameFormat format_;
   std::shared_ptr<Session> session_;

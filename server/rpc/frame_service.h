@@ -14,23 +14,21 @@ class FrameService final
     : public v1::FrameService::WithRawCallbackMethod_StreamFrames<
           v1::FrameService::WithRawCallbackMethod_ViewFrames<v1::FrameService::Service>> {
  public:
-  explicit FrameService(Backend& backend)
-      : backend_(backend),
-        streams_(static_cast<std::size_t>(backend.limits.max_streams), backend.stats) {}
+  explicit FrameService(Backend& backend) : backend_(backend), streams_(backend.stats) {}
 
   void drain() { streams_.drain(); }
 
   grpc::ServerWriteReactor<grpc::ByteBuffer>* StreamFrames(
-      grpc::CallbackServerContext*, const grpc::ByteBuffer* request) override {
+      grpc::CallbackServerContext* context, const grpc::ByteBuffer* request) override {
     const auto stream = std::make_shared<FrameStream>(backend_, streams_);
-    stream->start(*request);
+    stream->start(*context, *request);
     return stream.get();
   }
 
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* ViewFrames(
-      grpc::CallbackServerContext*) override {
+      grpc::CallbackServerContext* context) override {
     const auto view = std::make_shared<FrameView>(backend_, streams_);
-    view->start();
+    view->start(*context);
     return view.get();
   }
 

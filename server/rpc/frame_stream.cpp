@@ -10,9 +10,9 @@
 
 namespace weft {
 
-void FrameStream::start(const grpc::ByteBuffer& request) {
+void FrameStream::start(const grpc::ServerContextBase& context, const grpc::ByteBuffer& request) {
   std::lock_guard lock(mutex_);
-  if (!begin()) return;
+  if (!begin(context)) return;
   if (auto status = open(request); !status.ok()) return finish(status);
   write_header();
 }

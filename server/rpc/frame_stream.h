@@ -15,7 +15,7 @@ class FrameStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer>, pub
   using FrameCall::FrameCall;
 
   // Called once, first.
-  void start(const grpc::ByteBuffer& request);
+  void start(const grpc::ServerContextBase& context, const grpc::ByteBuffer& request);
 
   void OnWriteDone(bool ok) override { on_write_done(ok); }
   void OnCancel() override { on_cancel(); }

@@ -7,21 +7,14 @@
 
 namespace weft {
 
-FrameStreams::FrameStreams(std::size_t max_streams, Stats& stats)
-    : max_streams_(max_streams),
-      stats_(stats),
-      thread_([this](const std::stop_token& stop) { remind(stop); }) {}
+FrameStreams::FrameStreams(Stats& stats)
+    : stats_(stats), thread_([this](const std::stop_token& stop) { remind(stop); }) {}
 
 FrameStreams::~FrameStreams() = default;
 
 grpc::Status FrameStreams::add(std::shared_ptr<FrameCall> stream) {
   std::lock_guard lock(mutex_);
   if (draining_) return errors::server_draining();
-  if (streams_.size() >= max_streams_) {
-    return errors::exhausted(
-        "streams", "the server has " + std::to_string(max_streams_) + " open streams, its most",
-        true);
-  }
   streams_.insert(std::move(stream));
   ++stats_.streams;
   changed_.notify_one();

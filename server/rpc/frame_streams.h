@@ -16,15 +16,14 @@ namespace weft {
 
 class FrameCall;
 
-// The open calls that send frames, at most `max_streams`. A thread of its own reminds them of
-// Progress.
+// The open calls that send frames. A thread of its own reminds them of Progress.
 class FrameStreams {
  public:
   // With kTick later a reader hears something every two seconds.
   static constexpr std::chrono::milliseconds kTick{250};
   static constexpr std::chrono::milliseconds kProgressInterval{1750};
 
-  FrameStreams(std::size_t max_streams, Stats& stats);
+  explicit FrameStreams(Stats& stats);
   ~FrameStreams();
 
   // Why the stream is not one of them.
@@ -37,7 +36,6 @@ class FrameStreams {
  private:
   void remind(const std::stop_token& stop);
 
-  const std::size_t max_streams_;
   Stats& stats_;
   std::mutex mutex_;
   std::condition_variable_any changed_;

@@ -9,9 +9,9 @@
 
 namespace weft {
 
-void FrameView::start() {
+void FrameView::start(const grpc::ServerContextBase& context) {
   std::lock_guard lock(mutex_);
-  if (begin()) StartRead(&request_);
+  if (begin(context)) StartRead(&request_);
 }
 
 void FrameView::OnReadDone(bool ok) {

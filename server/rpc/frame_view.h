@@ -16,7 +16,7 @@ class FrameView final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::B
   using FrameCall::FrameCall;
 
   // Called once, first.
-  void start();
+  void start(const grpc::ServerContextBase& context);
 
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override { on_write_done(ok); }

@@ -40,11 +40,6 @@ grpc::Status to_status_of_stream(Refusal refusal, const Session& session) {
 grpc::Status Interactions::add(const std::shared_ptr<Interaction>& interaction) {
   std::lock_guard lock(mutex_);
   if (draining_) return errors::server_draining();
-  if (interactions_.size() >= most_) {
-    return errors::exhausted(
-        "streams", "the server has " + std::to_string(most_) + " calls of Interact, its most",
-        true);
-  }
   interactions_.insert(interaction);
   return grpc::Status::OK;
 }
@@ -64,10 +59,16 @@ void Interactions::drain() {
   for (const auto& interaction : interactions) interaction->drain();
 }
 
-void Interaction::start() {
+void Interaction::start(const grpc::ServerContextBase& context) {
   std::unique_lock lock(mutex_);
   self_ = shared_from_this();
-  if (const auto status = interactions_.add(self_); !status.ok()) end(status);
+  auto admitted = backend_.admit(context);
+  if (const auto* error = std::get_if<grpc::Status>(&admitted)) {
+    end(*error);
+  } else {
+    caller_ = std::get<StreamCaller>(std::move(admitted));
+    if (const auto status = interactions_.add(self_); !status.ok()) end(status);
+  }
   act(lock);
 }
 
@@ -114,7 +115,8 @@ void Interaction::OnWriteDone(bool ok) {
 
 grpc::Status Interaction::take(const v1::InteractRequest& request) {
   if (!session_) {
-    const auto found = find_session(backend_.registry, request.session(), "session");
+    const auto found =
+        find_session(backend_.registry, caller_.caller, request.session(), "session");
     if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
     session_ = std::get<std::shared_ptr<Session>>(found);
     hand_ = session_->new_hand();

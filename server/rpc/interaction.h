@@ -18,11 +18,9 @@ namespace weft {
 
 class Interaction;
 
-// The open calls of Interact, at most `most`. Thread-safe.
+// The open calls of Interact. Thread-safe.
 class Interactions {
  public:
-  explicit Interactions(std::size_t most) : most_(most) {}
-
   // Why the call is not one of them.
   grpc::Status add(const std::shared_ptr<Interaction>& interaction);
   void remove(const std::shared_ptr<Interaction>& interaction);
@@ -30,7 +28,6 @@ class Interactions {
   void drain();
 
  private:
-  const std::size_t most_;
   std::mutex mutex_;
   std::set<std::shared_ptr<Interaction>> interactions_;
   bool draining_ = false;
@@ -46,7 +43,7 @@ class Interaction final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc:
       : backend_(backend), interactions_(interactions), ticket_(backend.calls) {}
 
   // Called once, first.
-  void start();
+  void start(const grpc::ServerContextBase& context);
   // Ends the call with SERVER_DRAINING.
   void drain();
 
@@ -77,6 +74,7 @@ class Interaction final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc:
   std::shared_ptr<Interaction> self_;  // until OnDone
 
   std::mutex mutex_;  // guards all below
+  StreamCaller caller_;
   grpc::ByteBuffer request_, response_;
   std::shared_ptr<Session> session_;
   int hand_ = 0;

@@ -125,11 +125,14 @@ void LabService::drain() {
 }
 
 grpc::ServerWriteReactor<v1::RunTestResponse>* LabService::RunTest(
-    grpc::CallbackServerContext*, const v1::RunTestRequest* request) {
+    grpc::CallbackServerContext* context, const v1::RunTestRequest* request) {
   const auto run = std::make_shared<Run>(backend_.calls);
   run->hold();
+  const auto caller = backend_.access.caller(*context);
   const auto order = to_lab_order(*request);
-  if (const auto* problems = std::get_if<std::vector<Problem>>(&order)) {
+  if (const auto* error = std::get_if<grpc::Status>(&caller)) {
+    run->end(*error);
+  } else if (const auto* problems = std::get_if<std::vector<Problem>>(&order)) {
     run->end(errors::field_invalid(*problems));
   } else if (const grpc::Status refused = admit(run); !refused.ok()) {
     run->end(refused);

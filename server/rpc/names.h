@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "server/rpc/access.h"
 #include "server/session/registry.h"
 
 // Resource names: "sessions/{session}".
@@ -24,8 +25,9 @@ std::string make_session_id();
 
 using FoundSession = std::variant<std::shared_ptr<Session>, grpc::Status>;
 
-// The session called `name`, or why there is none; `field` is where the request names it.
-FoundSession find_session(const Registry& registry, const std::string& name,
+// The caller's session called `name`, or why there is none; `field` is where the request names it.
+// Admins find every session. To others, one that is not theirs looks as if there were none.
+FoundSession find_session(const Registry& registry, const Caller& caller, const std::string& name,
                           const std::string& field = "name");
 
 }  // namespace weft

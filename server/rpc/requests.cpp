@@ -8,7 +8,8 @@
 
 namespace weft {
 
-std::variant<Request, grpc::Status> named_request(const google::protobuf::Message& message,
+std::variant<Request, grpc::Status> named_request(const Caller& caller,
+                                                  const google::protobuf::Message& message,
                                                   const std::string& request_id) {
   constexpr std::size_t kLongest = 128;
   const bool printable =
@@ -20,7 +21,8 @@ std::variant<Request, grpc::Status> named_request(const google::protobuf::Messag
   if (request_id.empty()) return Request{};
   const std::string content = message.GetDescriptor()->full_name() + message.SerializeAsString();
   const auto checksum = crc32_z(0, reinterpret_cast<const Bytef*>(content.data()), content.size());
-  return Request{request_id, static_cast<std::uint32_t>(checksum)};
+  const std::string whose = caller.principal.empty() ? "" : caller.principal + " ";
+  return Request{whose + request_id, static_cast<std::uint32_t>(checksum)};
 }
 
 std::variant<std::optional<std::string>, grpc::Status> Requests::find(

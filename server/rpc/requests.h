@@ -8,12 +8,14 @@
 #include <string>
 #include <variant>
 
+#include "server/rpc/access.h"
 #include "server/session/request.h"
 
 namespace weft {
 
-// How the caller named the call, or what is wrong with the name.
-std::variant<Request, grpc::Status> named_request(const google::protobuf::Message& message,
+// How the caller named the call, or what is wrong with the name. Names are those of each principal.
+std::variant<Request, grpc::Status> named_request(const Caller& caller,
+                                                  const google::protobuf::Message& message,
                                                   const std::string& request_id);
 
 // The latest creations and deletions that were named. Thread-safe.

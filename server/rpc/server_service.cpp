@@ -2,6 +2,7 @@
 
 #include "core/motion/lattice_sweep.h"
 #include "server/rpc/server_stats.h"
+#include "server/rpc/unary_call.h"
 
 namespace weft {
 
@@ -12,6 +13,8 @@ std::string numerics_id() {
 grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerContext* context,
                                                        const v1::GetServerInfoRequest*,
                                                        v1::ServerInfo* response) {
+  const auto caller = backend_.access.caller(*context);
+  if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
   response->set_version(WEFT_VERSION);
   response->set_numerics_id(numerics_id());
   response->set_worker_threads(backend_.worker_threads);
@@ -24,18 +27,20 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
   limits->set_max_request_bytes(backend_.limits.max_request_bytes);
   limits->set_max_frame_bytes(backend_.limits.max_frame_bytes);
   limits->set_max_tests(backend_.limits.max_tests);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(grpc::Status::OK);
-  return reactor;
+  limits->set_max_total_particles(backend_.limits.max_total_particles);
+  limits->set_max_sessions_per_principal(backend_.limits.max_sessions_per_principal);
+  limits->set_max_particles_per_principal(backend_.limits.max_particles_per_principal);
+  limits->set_max_streams_per_principal(backend_.limits.max_streams_per_principal);
+  return answer(context, grpc::Status::OK);
 }
 
 grpc::ServerUnaryReactor* ServerService::GetServerStats(grpc::CallbackServerContext* context,
                                                         const v1::GetServerStatsRequest*,
                                                         v1::ServerStats* response) {
+  const auto caller = backend_.access.caller(*context);
+  if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
   *response = server_stats(backend_);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(grpc::Status::OK);
-  return reactor;
+  return answer(context, grpc::Status::OK);
 }
 
 }  // namespace weft

@@ -13,23 +13,35 @@
 namespace weft {
 namespace {
 
-grpc::ServerUnaryReactor* answer(grpc::CallbackServerContext* context, const grpc::Status& status) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(status);
-  return reactor;
+// A call that speaks of a session of its caller.
+struct Asked {
+  Caller caller;
+  std::shared_ptr<Session> session;
+};
+
+// Who calls, and his session of that name, or what is wrong with either.
+std::variant<Asked, grpc::Status> find(const Backend& backend,
+                                       const grpc::CallbackServerContext& context,
+                                       const std::string& name) {
+  const auto caller = backend.access.caller(context);
+  if (const auto* error = std::get_if<grpc::Status>(&caller)) return *error;
+  const auto found = find_session(backend.registry, std::get<Caller>(caller), name);
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
+  return Asked{std::get<Caller>(caller), std::get<std::shared_ptr<Session>>(found)};
 }
 
 // Submits a command under the caller's name for it, and finishes the call with what becomes of it;
 // `fill` writes the response.
 template <class Message, class Fill>
 grpc::ServerUnaryReactor* submit(OpenCalls& calls, grpc::CallbackServerContext* context,
-                                 const Message& request, const std::shared_ptr<Session>& session,
-                                 auto command, Fill fill, std::stop_source caller = {}) {
-  const auto named = named_request(request, request.request_id());
+                                 const Message& request, const Asked& asked, auto command,
+                                 Fill fill, std::stop_source stop = {}) {
+  const auto named = named_request(asked.caller, request, request.request_id());
   if (const auto* error = std::get_if<grpc::Status>(&named)) return answer(context, *error);
   command.request = std::get<Request>(named);
-  auto* call = new UnaryCall(calls, [session, caller]() mutable {
-    caller.request_stop();
+  const auto& session = asked.session;
+  auto* call = new UnaryCall(calls, [session, stop]() mutable {
+    stop.request_stop();
     session->wake();
   });
   command.done = [call, session, fill](const Outcome& outcome) {
@@ -101,26 +113,23 @@ grpc::Status to_status(const Refusal& refusal, const Session& session) {
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
                                                      const v1::GetSessionRequest* request,
                                                      v1::Session* response) {
-  return answer(context, get(*request, *response));
-}
-
-grpc::Status SessionService::get(const v1::GetSessionRequest& request,
-                                 v1::Session& response) const {
-  const auto found = find_session(backend_.registry, request.name());
-  if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
-  const auto& session = std::get<std::shared_ptr<Session>>(found);
+  const auto found = find(backend_, *context, request->name());
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
+  const auto& session = std::get<Asked>(found).session;
   session->attend();
-  response = to_proto(*session);
-  return grpc::Status::OK;
+  *response = to_proto(*session);
+  return answer(context, grpc::Status::OK);
 }
 
 grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerContext* context,
                                                        const v1::ListSessionsRequest* request,
                                                        v1::ListSessionsResponse* response) {
-  return answer(context, list(*request, *response));
+  const auto caller = backend_.access.caller(*context);
+  if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
+  return answer(context, list(std::get<Caller>(caller), *request, *response));
 }
 
-grpc::Status SessionService::list(const v1::ListSessionsRequest& request,
+grpc::Status SessionService::list(const Caller& caller, const v1::ListSessionsRequest& request,
                                   v1::ListSessionsResponse& response) const {
   constexpr int kMost = 1000, kDefault = 100;
   if (request.page_size() < 0 || request.page_size() > kMost) {
@@ -132,7 +141,8 @@ grpc::Status SessionService::list(const v1::ListSessionsRequest& request,
   }
   const int size = request.page_size() == 0 ? kDefault : request.page_size();
   const auto sessions =
-      backend_.registry.list(request.page_token(), static_cast<std::size_t>(size) + 1);
+      backend_.registry.list(request.page_token(), static_cast<std::size_t>(size) + 1,
+                             caller.is_admin ? std::nullopt : std::optional(caller.principal));
   for (const auto& session : sessions) {
     if (response.sessions_size() == size) {  // the one too many tells that there is a next page
       response.set_next_page_token(sessions[sessions.size() - 2]->id());
@@ -146,15 +156,18 @@ grpc::Status SessionService::list(const v1::ListSessionsRequest& request,
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         v1::DeleteSessionResponse*) {
+  const auto known_caller = backend_.access.caller(*context);
+  if (const auto* error = std::get_if<grpc::Status>(&known_caller)) return answer(context, *error);
   if (backend_.draining) return answer(context, errors::server_draining());
-  const auto named = named_request(*request, request->request_id());
+  const auto& caller = std::get<Caller>(known_caller);
+  const auto named = named_request(caller, *request, request->request_id());
   if (const auto* error = std::get_if<grpc::Status>(&named)) return answer(context, *error);
   const Request& name = std::get<Request>(named);
   const auto known = backend_.requests.find(name);
   if (const auto* error = std::get_if<grpc::Status>(&known)) return answer(context, *error);
   if (std::get<std::optional<std::string>>(known)) return answer(context, grpc::Status::OK);
 
-  const auto found = find_session(backend_.registry, request->name());
+  const auto found = find_session(backend_.registry, caller, request->name());
   std::shared_ptr<Session> session;
   std::string uid;
   if (const auto* there = std::get_if<std::shared_ptr<Session>>(&found)) {
@@ -187,10 +200,10 @@ grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* SessionService::UpdateTextile(grpc::CallbackServerContext* context,
                                                         const v1::UpdateTextileRequest* request,
                                                         v1::UpdateTextileResponse* response) {
-  const auto found = find_session(backend_.registry, request->name());
+  const auto found = find(backend_, *context, request->name());
   if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
-  const auto& session = std::get<std::shared_ptr<Session>>(found);
-  const auto sheet = find_sheet(session->scene(), request->sheet());
+  const auto& asked = std::get<Asked>(found);
+  const auto sheet = find_sheet(asked.session->scene(), request->sheet());
   if (const auto* error = std::get_if<grpc::Status>(&sheet)) return answer(context, *error);
   if (!request->has_textile())
     return answer(context, errors::field_invalid("textile", "is absent"));
@@ -217,7 +230,7 @@ grpc::ServerUnaryReactor* SessionService::UpdateTextile(grpc::CallbackServerCont
     }
     return edited;
   };
-  return submit(backend_.calls, context, *request, session, std::move(command),
+  return submit(backend_.calls, context, *request, asked, std::move(command),
                 [response](const Applied& applied) {
                   response->set_applied_frame(applied.frame);
                   *response->mutable_textile() = to_proto(applied.textile);
@@ -229,7 +242,7 @@ grpc::ServerUnaryReactor* SessionService::ApplyActions(grpc::CallbackServerConte
                                                        const v1::ApplyActionsRequest* request,
                                                        v1::ApplyActionsResponse* response) {
   constexpr int kMost = 1000;
-  const auto found = find_session(backend_.registry, request->name());
+  const auto found = find(backend_, *context, request->name());
   if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
   if (request->actions_size() < 1 || request->actions_size() > kMost) {
     return answer(context,
@@ -247,15 +260,14 @@ grpc::ServerUnaryReactor* SessionService::ApplyActions(grpc::CallbackServerConte
     }
   }
   if (!problems.empty()) return answer(context, errors::field_invalid(problems));
-  return submit(backend_.calls, context, *request, std::get<std::shared_ptr<Session>>(found),
-                std::move(command),
+  return submit(backend_.calls, context, *request, std::get<Asked>(found), std::move(command),
                 [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
 }
 
 grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* SessionService::Interact(
-    grpc::CallbackServerContext*) {
+    grpc::CallbackServerContext* context) {
   const auto interaction = std::make_shared<Interaction>(backend_, interactions_);
-  interaction->start();
+  interaction->start(*context);
   return interaction.get();
 }
 
@@ -263,9 +275,8 @@ grpc::ServerUnaryReactor* SessionService::StepSession(grpc::CallbackServerContex
                                                       const v1::StepSessionRequest* request,
                                                       v1::StepSessionResponse* response) {
   constexpr std::int64_t kMostFrames = 100'000;
-  const auto found = find_session(backend_.registry, request->name());
+  const auto found = find(backend_, *context, request->name());
   if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
-  const auto& session = std::get<std::shared_ptr<Session>>(found);
   StepCommand command;
   if (request->has_frames()) command.frames = request->frames();
   if (command.frames < 1 || command.frames > kMostFrames) {
@@ -274,21 +285,22 @@ grpc::ServerUnaryReactor* SessionService::StepSession(grpc::CallbackServerContex
   }
   if (request->has_expected_frame()) command.expected_frame = request->expected_frame();
 
-  std::stop_source caller;
-  if (request->request_id().empty()) command.cancelled = caller.get_token();
+  std::stop_source stop;
+  if (request->request_id().empty()) command.cancelled = stop.get_token();
   const auto fill = [response](const Applied& applied) {
     response->set_applied_frame(applied.frame);
     response->set_frame(applied.newest);
     response->set_time_s(applied.time);
     response->set_at_rest(applied.at_rest);
   };
-  return submit(backend_.calls, context, *request, session, std::move(command), fill, caller);
+  return submit(backend_.calls, context, *request, std::get<Asked>(found), std::move(command), fill,
+                stop);
 }
 
 grpc::ServerUnaryReactor* SessionService::RunSession(grpc::CallbackServerContext* context,
                                                      const v1::RunSessionRequest* request,
                                                      v1::RunSessionResponse* response) {
-  const auto found = find_session(backend_.registry, request->name());
+  const auto found = find(backend_, *context, request->name());
   if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
   RunCommand command;
   if (request->has_time_scale()) {
@@ -302,18 +314,16 @@ grpc::ServerUnaryReactor* SessionService::RunSession(grpc::CallbackServerContext
   }
   if (request->has_until_frame()) command.until_frame = request->until_frame();
   command.until_rest = request->until_rest();
-  return submit(backend_.calls, context, *request, std::get<std::shared_ptr<Session>>(found),
-                std::move(command),
+  return submit(backend_.calls, context, *request, std::get<Asked>(found), std::move(command),
                 [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
 }
 
 grpc::ServerUnaryReactor* SessionService::PauseSession(grpc::CallbackServerContext* context,
                                                        const v1::PauseSessionRequest* request,
                                                        v1::PauseSessionResponse* response) {
-  const auto found = find_session(backend_.registry, request->name());
+  const auto found = find(backend_, *context, request->name());
   if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
-  return submit(backend_.calls, context, *request, std::get<std::shared_ptr<Session>>(found),
-                PauseCommand{},
+  return submit(backend_.calls, context, *request, std::get<Asked>(found), PauseCommand{},
                 [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
 }
 

@@ -67,16 +67,18 @@ class SessionService final : public SessionMethods {
 
  private:
   class Creation;
-  bool begin(const std::shared_ptr<Creation>& creation);  // false: the server is going down
+  grpc::Status begin(const std::shared_ptr<Creation>& creation);  // or why not
   void end(const std::shared_ptr<Creation>& creation);
-  grpc::Status create(const v1::CreateSessionRequest& request, v1::Session& response);
+  grpc::Status refusal(const Caller& caller, const v1::CreateSessionRequest& request,
+                       const std::string& id) const;
+  grpc::Status create(const Caller& caller, const v1::CreateSessionRequest& request,
+                      v1::Session& response);
   grpc::Status created_before(const std::string& uid, v1::Session& response) const;
-  grpc::Status get(const v1::GetSessionRequest& request, v1::Session& response) const;
-  grpc::Status list(const v1::ListSessionsRequest& request,
+  grpc::Status list(const Caller& caller, const v1::ListSessionsRequest& request,
                     v1::ListSessionsResponse& response) const;
 
   Backend& backend_;
-  Interactions interactions_{static_cast<std::size_t>(backend_.limits.max_streams)};
+  Interactions interactions_;
   std::mutex mutex_;
   std::set<std::shared_ptr<Creation>> creations_;  // guarded by mutex_
 };

@@ -9,6 +9,14 @@
 
 namespace weft {
 
+// Finishes a unary call at once.
+inline grpc::ServerUnaryReactor* answer(grpc::CallbackServerContext* context,
+                                        const grpc::Status& status) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(status);
+  return reactor;
+}
+
 // A unary call that is finished later, from another thread. Deletes itself when it is done.
 class UnaryCall final : public grpc::ServerUnaryReactor {
  public:

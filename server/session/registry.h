@@ -6,24 +6,33 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "server/session/limits.h"
+#include "server/session/quota.h"
 #include "server/session/session.h"
 
 namespace weft {
 
-// The sessions of a server by id, at most `max_sessions`. Thread-safe.
+// The sessions of a server by id, as many and as large as its limits allow. Thread-safe.
 class Registry {
  public:
-  enum class Refused { kExists, kFull, kClosed };
+  // Why a session cannot be added: its id is taken, there are too many, or it is closed.
+  struct Exists {
+    std::string owner;  // who has it
+  };
+  struct Closed {};
+  using Refused = std::variant<Exists, Quota::Excess, Closed>;
 
-  explicit Registry(std::size_t max_sessions) : max_sessions_(max_sessions) {}
+  explicit Registry(const Limits& limits);
 
-  // Why a session of this id could not be added; nullopt: it could.
-  std::optional<Refused> refusal(const std::string& id) const;
+  // Why a session like this could not be added; nullopt: it could.
+  std::optional<Refused> refusal(const std::string& id, const std::string& owner,
+                                 std::int64_t particles) const;
   std::optional<Refused> add(std::shared_ptr<Session> session);
 
-  // Of an earlier process: more than `max_sessions` may be.
+  // Of an earlier process: they may exceed the limits.
   void restore(std::shared_ptr<Session> session);
   // Something that has the name of a session but is none.
   struct Damaged {
@@ -38,8 +47,9 @@ class Registry {
 
   std::shared_ptr<Session> find_uid(const std::string& uid) const;  // or nullptr
 
-  // In order of id, at most `count` of those after `after`.
-  std::vector<std::shared_ptr<Session>> list(const std::string& after, std::size_t count) const;
+  // In order of id, at most `count` of those after `after`; of one owner, or of all.
+  std::vector<std::shared_ptr<Session>> list(const std::string& after, std::size_t count,
+                                             const std::optional<std::string>& owner = {}) const;
   std::size_t size() const;
 
   // Takes a session out and ends it; false where it is not one of them.
@@ -49,11 +59,18 @@ class Registry {
   void close(Refusal::Why why);
 
  private:
-  std::optional<Refused> refusal_locked(const std::string& id) const;
+  struct Entry {
+    std::shared_ptr<Session> session;
+    Quota::Share of_sessions, of_particles;
+  };
+  // with the mutex held
+  std::optional<Refused> refusal_locked(const std::string& id, const std::string& owner,
+                                        std::int64_t particles) const;
+  void insert(std::shared_ptr<Session> session);
 
-  std::size_t max_sessions_;
+  Quota session_quota_, particle_quota_;
   mutable std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<Session>> sessions_;
+  std::map<std::string, Entry> sessions_;
   std::map<std::string, Damaged> damaged_;
   bool closed_ = false;
 };

@@ -11,7 +11,7 @@ namespace weft {
 
 // Names a call, so that it is carried out once however often it is sent.
 struct Request {
-  std::string id;              // empty: it has no name
+  std::string id;              // with the caller's principal before it; empty: it has no name
   std::uint32_t checksum = 0;  // of all that the call says
 };
 

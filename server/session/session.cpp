@@ -36,10 +36,17 @@ bool must_be_taken(const Command& command) {
          act->actions.front().kind == Action::Kind::kLetGo;
 }
 
+std::int64_t count_particles(const Scene& scene) {
+  std::int64_t particles = 0;
+  for (const auto& sheet : scene.sheets) particles += sheet.particle_count();
+  return particles;
+}
+
 }  // namespace
 
-SessionIdentity make_identity(std::string id, std::string numerics_id) {
-  return {std::move(id), make_uid(), std::move(numerics_id), std::chrono::system_clock::now()};
+SessionIdentity make_identity(std::string id, std::string numerics_id, std::string owner) {
+  return {std::move(id), make_uid(), std::move(numerics_id), std::chrono::system_clock::now(),
+          std::move(owner)};
 }
 
 Session::Session(SessionIdentity identity, Simulation simulation, const SessionHost& host,
@@ -51,6 +58,7 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
       notify_(host.notify),
       simulation_(std::move(simulation)),
       scene_(simulation_.scene()),
+      particle_count_(count_particles(scene_)),
       snapshot_after_(host.snapshot_after),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),

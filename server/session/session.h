@@ -29,10 +29,11 @@ struct SessionIdentity {
   std::string uid;          // another session of the same id has another one
   std::string numerics_id;  // of the server that created it
   std::chrono::system_clock::time_point create_time;
+  std::string owner;  // principal; empty: nobody's, made where there were none
 };
 
 // A new session's, with a uid of 128 random bits.
-SessionIdentity make_identity(std::string id, std::string numerics_id);
+SessionIdentity make_identity(std::string id, std::string numerics_id, std::string owner = {});
 
 // What a session shows of itself.
 struct SessionStatus {
@@ -92,6 +93,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   const std::string& id() const { return identity_.id; }
   const std::string& uid() const { return identity_.uid; }
   const std::string& numerics_id() const { return identity_.numerics_id; }
+  const std::string& owner() const { return identity_.owner; }
+  std::int64_t particle_count() const { return particle_count_; }
   std::chrono::system_clock::time_point create_time() const { return identity_.create_time; }
 
   // As it was created; for textiles see status(). Actions do not show.
@@ -224,6 +227,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Answers<Outcome> answers_{kMaxAnswers};  // touched by the slice only
   std::int64_t entries_ = 0;               // of the log, carried out; touched by the slice only
   const Scene scene_;
+  const std::int64_t particle_count_;
   std::atomic<int> hands_ = 0;
   const std::chrono::duration<double> snapshot_after_;
   std::chrono::duration<double> work_{};  // since the last snapshot; touched by the slice only

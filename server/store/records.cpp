@@ -109,6 +109,7 @@ std::string encode(const KeptSession& session) {
   *to.mutable_create_time() = TimeUtil::NanosecondsToTimestamp(
       std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count());
   *to.mutable_scene() = as_given(session.scene);
+  to.set_owner(session.identity.owner);
   return to.SerializeAsString();
 }
 
@@ -136,7 +137,8 @@ KeptSession decode_session(const std::string& bytes) {
   const std::chrono::nanoseconds created(TimeUtil::TimestampToNanoseconds(from.create_time()));
   return {{from.id(), from.uid(), from.numerics_id(),
            std::chrono::system_clock::time_point(
-               std::chrono::duration_cast<std::chrono::system_clock::duration>(created))},
+               std::chrono::duration_cast<std::chrono::system_clock::duration>(created)),
+           from.owner()},
           trusted(to_scene(from.scene(), "scene"))};
 }
 

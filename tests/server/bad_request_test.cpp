@@ -494,21 +494,6 @@ void expect_explained(const Error& error, bool decoded) {
   EXPECT_TRUE(error.code != INVALID_ARGUMENT || !decoded || !error.fields().empty());
 }
 
-std::vector<const MethodDescriptor*> methods() {
-  std::vector<const MethodDescriptor*> methods;
-  for (const auto* file :
-       {v1::StreamFramesRequest::descriptor()->file(), v1::RunTestRequest::descriptor()->file(),
-        v1::ServerInfo::descriptor()->file(), v1::Session::descriptor()->file(),
-        v1::Textile::descriptor()->file()}) {
-    for (int i = 0; i < file->service_count(); ++i) {
-      for (int k = 0; k < file->service(i)->method_count(); ++k) {
-        methods.push_back(file->service(i)->method(k));
-      }
-    }
-  }
-  return methods;
-}
-
 // Whether as much as is allowed takes a second.
 bool is_costly(const FieldDescriptor& field) {
   return field.name() == "frames" || field.name() == "rows" || field.name() == "columns";
@@ -570,7 +555,7 @@ TEST(BadRequests, OfEveryFieldAreRefusedByNameAndChangeNothing) {
   v1::Scene scene = full_scene();
   expect_everything_occurs(scene);
   Subject subject;
-  for (const MethodDescriptor* method : methods()) {
+  for (const MethodDescriptor* method : all_methods()) {
     for (const auto& request : good_requests(*method->input_type())) {
       SCOPED_TRACE(method->full_name());
       const bool known = !known_requests(method->input_type()->name()).empty();
@@ -616,7 +601,7 @@ TEST(BadRequests, OfDamagedBytesAreRefusedOrReadAsTheyAre) {
   const google::protobuf::LogSilencer silence;
   Subject subject;
   std::mt19937 random(7);
-  for (const MethodDescriptor* method : methods()) {
+  for (const MethodDescriptor* method : all_methods()) {
     if (method->name() == "StepSession") continue;  // some would take long, rightly
     SCOPED_TRACE(method->full_name());
     const auto requests = good_requests(*method->input_type());

@@ -206,7 +206,7 @@ TEST(Errors, OfLimitsNameTheQuota) {
   large.mutable_sheets(0)->mutable_grid()->set_rows(5);
   const Error particles = service.create_error(large);
   expect_error(particles, grpc::StatusCode::RESOURCE_EXHAUSTED, "QUOTA_EXCEEDED");
-  EXPECT_EQ(particles.quota.violations(0).subject(), "particles");
+  EXPECT_EQ(particles.quota.violations(0).subject(), "particles_per_session");
   EXPECT_FALSE(particles.retry) << "later it is as large as now";
   service.create();
   const Error sessions = service.create_error(small_scene());

@@ -211,6 +211,22 @@ TEST(Config, RefusesToListenBeyondThisMachineUnlessToldTwice) {
   EXPECT_EQ(config({"--host", "0.0.0.0", "--insecure"}).server.host, "0.0.0.0");
 }
 
+TEST(Config, OpensTheServerToOtherMachinesWithTlsButNotItsMetrics) {
+  const Config read = config({"--host", "0.0.0.0", "--tls-cert", "c", "--tls-key", "k"});
+  EXPECT_EQ(read.server.tls->certificate, "c");
+  EXPECT_EQ(read.server.tls->client_ca, std::nullopt);
+  EXPECT_THAT(refusal({"--host", "0.0.0.0", "--tokens", "t"}), HasSubstr("--insecure"));
+  EXPECT_THAT(refusal({"--metrics", "0.0.0.0:1", "--tls-cert", "c", "--tls-key", "k"}),
+              HasSubstr("metrics is 0.0.0.0:1, which other machines can reach"));
+  EXPECT_THAT(refusal({"--tls-cert", "c"}), HasSubstr("one is missing"));
+  EXPECT_THAT(refusal({"--tls-client-ca", "c"}), HasSubstr("one is missing"));
+  const TomlFile file("tls_cert = \"c\"\ntls_key = \"k\"\ntls_client_ca = \"a\"\ntokens = \"t\"\n");
+  const Config from_file = config({"--config", file.path(), "--tls-key", "l"});
+  EXPECT_EQ(from_file.server.tls->key, "l");
+  EXPECT_EQ(from_file.server.tls->client_ca, "a");
+  EXPECT_EQ(from_file.server.tokens, "t");
+}
+
 TEST(Config, KeepsSessionsUnlessToldNotTo) {
   EXPECT_THAT(config({}).server.data_dir.value_or(""), Not(IsEmpty()));
   EXPECT_EQ(config({"--data-dir", "/var/cloth"}).server.data_dir, "/var/cloth");
@@ -221,9 +237,26 @@ TEST(Config, KeepsSessionsUnlessToldNotTo) {
 
 TEST(Config, HelpsWithEveryFlag) {
   const std::string help = refusal({"--help"});
-  for (const char* flag :
-       {"--host", "--port", "--config", "--data-dir", "--insecure", "--workers", "--max-sessions",
-        "--max-particles", "--max-streams", "--max-tests", "--history-bytes", "--log-level"}) {
+  for (const char* flag : {"--host",
+                           "--port",
+                           "--config",
+                           "--data-dir",
+                           "--insecure",
+                           "--workers",
+                           "--max-sessions",
+                           "--max-particles",
+                           "--max-streams",
+                           "--tls-cert",
+                           "--tls-key",
+                           "--tls-client-ca",
+                           "--tokens",
+                           "--max-sessions-per-principal",
+                           "--max-particles-per-principal",
+                           "--max-total-particles",
+                           "--max-streams-per-principal",
+                           "--max-tests",
+                           "--history-bytes",
+                           "--log-level"}) {
     EXPECT_THAT(help, HasSubstr(flag));
   }
 }

@@ -1,10 +1,5 @@
 #include "server/session/stats.h"
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <stdexcept>
 #include <string>
 
@@ -80,25 +75,6 @@ TEST(ServerStats, SayHowLatePacedFramesAre) {
   }
   EXPECT_GT(service.get(session).lateness_s(), 0);
   EXPECT_GT(stats_of(service).lateness_s().sum(), 0);
-}
-
-// What an HTTP server answers to GET /metrics.
-std::string metrics_at(const std::string& address) {
-  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_port =
-      htons(static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1))));
-  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  EXPECT_EQ(connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
-  const std::string request = "GET /metrics HTTP/1.0\r\n\r\n";
-  EXPECT_EQ(send(socket, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
-  std::string answer;
-  char bytes[4096];
-  for (ssize_t n; (n = recv(socket, bytes, sizeof bytes, 0)) > 0;)
-    answer.append(bytes, static_cast<std::size_t>(n));
-  close(socket);
-  return answer;
 }
 
 TEST(Metrics, TellPrometheusTheSame) {

@@ -25,7 +25,8 @@ class TextileServiceTest : public ::testing::Test {
     return stub_->GetTextile(&context, request, &preset);
   }
 
-  TextileService service_;
+  const Access access_{std::nullopt, false};
+  TextileService service_{access_};
   std::unique_ptr<grpc::Server> server_ =
       grpc::ServerBuilder().RegisterService(&service_).BuildAndStart();
   std::unique_ptr<v1::TextileService::Stub> stub_ =

@@ -1,10 +1,16 @@
 #include "tests/support/service/service.h"
 
+#include <arpa/inet.h>
 #include <grpcpp/generic/generic_stub.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <utility>
 
 #include "google/rpc/status.pb.h"
+#include "weft/v1/lab.pb.h"
+#include "weft/v1/textile.pb.h"
 
 namespace weft::testing {
 namespace {
@@ -181,10 +187,12 @@ Error Stream::finish() {
 }
 
 std::pair<std::string, Error> raw_call(Service& service, const std::string& method,
-                                       const std::string& request, bool streams) {
+                                       const std::string& request, bool streams,
+                                       const std::string& token) {
   grpc::GenericStub stub(service.channel);
   grpc::CompletionQueue queue;
   grpc::ClientContext context;
+  if (!token.empty()) context.AddMetadata("authorization", "Bearer " + token);
   const auto done = [&queue] {
     void* tag = nullptr;
     bool ok = false;
@@ -209,6 +217,38 @@ std::pair<std::string, Error> raw_call(Service& service, const std::string& meth
   grpc::Slice bytes;
   if (response.Valid()) response.DumpToSingleSlice(&bytes);
   return {std::string(bytes.begin(), bytes.end()), Error(status)};
+}
+
+std::string metrics_at(const std::string& address) {
+  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port =
+      htons(static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1))));
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to), 0);
+  const std::string request = "GET /metrics HTTP/1.0\r\n\r\n";
+  EXPECT_EQ(send(socket, request.data(), request.size(), 0), static_cast<ssize_t>(request.size()));
+  std::string answer;
+  char bytes[4096];
+  for (ssize_t n; (n = recv(socket, bytes, sizeof bytes, 0)) > 0;)
+    answer.append(bytes, static_cast<std::size_t>(n));
+  close(socket);
+  return answer;
+}
+
+std::vector<const google::protobuf::MethodDescriptor*> all_methods() {
+  std::vector<const google::protobuf::MethodDescriptor*> methods;
+  for (const auto* file :
+       {v1::StreamFramesRequest::descriptor()->file(), v1::RunTestRequest::descriptor()->file(),
+        v1::ServerInfo::descriptor()->file(), v1::Session::descriptor()->file(),
+        v1::Textile::descriptor()->file()}) {
+    for (int i = 0; i < file->service_count(); ++i) {
+      for (int k = 0; k < file->service(i)->method_count(); ++k)
+        methods.push_back(file->service(i)->method(k));
+    }
+  }
+  return methods;
 }
 
 v1::StreamFramesRequest frames_of(const v1::Session& session, std::int64_t start,

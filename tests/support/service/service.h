@@ -1,6 +1,7 @@
 #pragma once
 
 #include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
 #include <grpcpp/grpcpp.h>
 
 #include <functional>
@@ -100,7 +101,14 @@ class Stream {
 
 // A call by bytes alone: what a method answers first, and its error. A stream is cancelled then.
 std::pair<std::string, Error> raw_call(Service& service, const std::string& method,
-                                       const std::string& request, bool streams = false);
+                                       const std::string& request, bool streams = false,
+                                       const std::string& token = {});
+
+// Every method of the interface, from its descriptors.
+std::vector<const google::protobuf::MethodDescriptor*> all_methods();
+
+// What an HTTP server answers to GET /metrics.
+std::string metrics_at(const std::string& address);
 
 // From `start` on, to `end` where it is not below 0.
 v1::StreamFramesRequest frames_of(const v1::Session& session, std::int64_t start = 0,

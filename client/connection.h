@@ -19,11 +19,21 @@ namespace weft::client {
 
 inline constexpr const char* kDefaultServer = "127.0.0.1:7311";
 
+// What a server is shown, and how it is known. Files are in PEM; an empty name is none.
+struct Credentials {
+  std::string tls_ca;             // certificates, one of which signed the server's; none: no TLS
+  std::string tls_cert, tls_key;  // our own
+  std::string token_file;         // says who we are
+  std::string token;              // the same; the file goes before
+};
+
 // A server to talk to: one that listens somewhere, or one of our own within this process.
 class Connection {
  public:
-  // A request to stop cancels every call.
-  static std::unique_ptr<Connection> to(const std::string& address, std::stop_token stop);
+  // A request to stop cancels every call. Throws a Problem where a file cannot be used, or a token
+  // would leave this machine unencrypted.
+  static std::unique_ptr<Connection> to(const std::string& address, std::stop_token stop,
+                                        const Credentials& credentials = {});
   static std::unique_ptr<Connection> embedded(std::stop_token stop);
   // One more to the same server, for more calls than one carries.
   std::unique_ptr<Connection> another() const;
@@ -66,10 +76,12 @@ class Connection {
 
  private:
   class Embedded;
-  Connection(std::shared_ptr<Embedded> server, std::string address,
-             std::shared_ptr<grpc::Channel> channel, std::stop_token stop);
+  class Dialer;
+  Connection(std::shared_ptr<Embedded> server, std::shared_ptr<const Dialer> dialer,
+             std::string address, std::shared_ptr<grpc::Channel> channel, std::stop_token stop);
 
-  std::shared_ptr<Embedded> embedded_;
+  std::shared_ptr<Embedded> embedded_;  // or
+  std::shared_ptr<const Dialer> dialer_;
   std::string address_;
   std::stop_token stop_;
   std::shared_ptr<grpc::Channel> channel_;

@@ -7,7 +7,7 @@ namespace weft::client {
 
 Connection& Context::connection() {
   if (!connection_)
-    connection_ = embedded ? Connection::embedded(stop) : Connection::to(server, stop);
+    connection_ = embedded ? Connection::embedded(stop) : Connection::to(server, stop, credentials);
   return *connection_;
 }
 

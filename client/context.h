@@ -19,6 +19,7 @@ class Context {
   Terminal terminal;
   std::stop_token stop;
   std::string server = kDefaultServer;
+  Credentials credentials;
   bool embedded = false;
   bool json = false;
 

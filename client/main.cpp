@@ -31,7 +31,9 @@ int main(int argc, char** argv) {
   std::stop_source stop;
   std::thread(wait_for_signals, signals, stop).detach();
 
-  spdlog::set_level(spdlog::level::off);  // an embedded server says it in its answers
+  // an embedded server, and gRPC, say it in their answers
+  spdlog::set_level(spdlog::level::off);
+  setenv("GRPC_VERBOSITY", "NONE", 0);
 
   const weft::client::Terminal terminal{std::cout, std::cerr, isatty(STDOUT_FILENO) == 1,
                                         isatty(STDERR_FILENO) == 1};

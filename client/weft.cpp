@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "client/commands/commands.h"
 #include "client/context.h"
@@ -57,6 +58,17 @@ void add_options(CLI::App& app, Context& context) {
       ->type_name("ADDRESS")
       ->envname("WEFT_SERVER")
       ->capture_default_str();
+  Credentials& own = context.credentials;
+  if (const char* token = std::getenv("WEFT_TOKEN")) own.token = token;
+  const auto file = [&](const char* flag, std::string& path, const char* variable,
+                        const char* help) {
+    app.add_option(flag, path, help)->type_name("FILE")->envname(variable);
+  };
+  file("--tls-ca", own.tls_ca, "WEFT_TLS_CA", "Use TLS with a server that one of these signed");
+  file("--tls-cert", own.tls_cert, "WEFT_TLS_CERT", "Certificate to show the server");
+  file("--tls-key", own.tls_key, "WEFT_TLS_KEY", "Its key");
+  file("--token-file", own.token_file, "WEFT_TOKEN_FILE",
+       "Token to show the server; or WEFT_TOKEN");
   app.add_flag("--embedded", context.embedded, "Use a server within this command instead");
   app.add_flag("--json", context.json, "Answer in JSON");
   app.set_version_flag("--version", WEFT_VERSION);
@@ -83,6 +95,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_view(app, context);
   add_script(app, context);
   add_health(app, context);
+  add_token(app, context);
   add_load(app, context);
   add_demo(app, context);
   add_completion(app, context);
@@ -98,7 +111,8 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
   CLI::App app(kDescription, "weft");
   app.fallthrough();
   app.get_formatter()->column_width(36);
-  app.footer("--server, --embedded and --json go with every command: weft --help");
+  app.footer(
+      "--server, --token-file, --tls-ca, --embedded and --json go with every command: weft --help");
   add_options(app, context);
   add_commands(app, context);
   app.footer(kFooter);  // the commands keep the line above

@@ -93,6 +93,7 @@ std::string session_text(const v1::Session& session) {
     facts.add("repair", fmt::format("frame {}, {} a substep from there on: {}", repair.frame(),
                                     seconds_text(repair.substep_s()), repair.reason()));
   }
+  if (!session.owner().empty()) facts.add("owner", session.owner());
   if (!session.failure().empty()) facts.add("failure", session.failure());
   return facts.text();
 }

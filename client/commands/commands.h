@@ -29,12 +29,13 @@ void add_plot(CLI::App& app, Context& context);
 void add_render(CLI::App& app, Context& context);
 void add_view(CLI::App& app, Context& context);
 void add_script(CLI::App& app, Context& context);
+void add_token(CLI::App& app, Context& context);
 void add_health(CLI::App& app, Context& context);
 void add_load(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
 void add_completion(CLI::App& app, Context& context);
 // What may stand for the last of the words after "weft", a line each.
-std::string completions(const CLI::App& app, std::vector<std::string> words, Context& context);
+std::string completions(CLI::App& app, std::vector<std::string> words, Context& context);
 
 using Sessions = v1::SessionService::Stub;
 using Servers = v1::ServerService::Stub;

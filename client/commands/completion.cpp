@@ -51,10 +51,19 @@ bool names_session(const CLI::App& command) {
                      [](const CLI::Option* option) { return option->get_name() == "SESSION"; });
 }
 
+// As parsing does, for options that are not given.
+void take_environment(CLI::App& app) {
+  for (CLI::Option* option : app.get_options()) {
+    const char* value = std::getenv(option->get_envname().c_str());
+    if (value == nullptr || *value == 0) continue;
+    option->add_result(value);
+    option->run_callback();
+  }
+}
+
 std::vector<std::string> sessions(Context& context) {
   std::vector<std::string> names;
   try {
-    if (const char* server = std::getenv("WEFT_SERVER")) context.server = server;
     const v1::ListSessionsResponse all = list_sessions(context.connection());
     for (const v1::Session& session : all.sessions())
       names.push_back(session.name().substr(session.name().find('/') + 1));
@@ -93,7 +102,8 @@ std::vector<std::string> candidates(const CLI::App& app, std::span<const std::st
 
 }  // namespace
 
-std::string completions(const CLI::App& app, std::vector<std::string> words, Context& context) {
+std::string completions(CLI::App& app, std::vector<std::string> words, Context& context) {
+  take_environment(app);
   if (words.empty()) words.emplace_back();
   std::vector<std::string> found = candidates(app, words, context);
   std::erase_if(found, [&](const std::string& each) { return !each.starts_with(words.back()); });

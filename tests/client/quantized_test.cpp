@@ -26,7 +26,7 @@ v1::Frame packed(const std::vector<double>& positions, const v1::StreamHeader& h
   Frame frame;
   frame.positions = positions;
   v1::StreamFramesResponse message;
-  EXPECT_TRUE(decode(encoded_frame(frame, header.format()), message));
+  EXPECT_TRUE(weft::decode(encoded_frame(frame, header.format()), message));
   return message.frame();
 }
 

@@ -1,0 +1,68 @@
+#include <fmt/format.h>
+#include <openssl/rand.h>
+#include <openssl/sha.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+
+#include "client/commands/commands.h"
+
+namespace weft::client {
+namespace {
+
+using Bytes = std::array<unsigned char, 32>;
+
+struct TokenOptions {
+  std::string principal;
+  std::string output;
+  bool admin = false;
+};
+
+std::string hex(const Bytes& bytes) { return fmt::format("{:02x}", fmt::join(bytes, "")); }
+
+// In a new file that nobody else can read.
+void write_secret(const std::string& path, const std::string& text) {
+  namespace fs = std::filesystem;
+  if (fs::exists(path)) throw unwritable(path, "it is there; a token is not written over another");
+  std::ofstream file(path);
+  std::error_code error;
+  fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write, error);
+  if (!(file << text << std::flush)) throw unwritable(path, std::strerror(errno));
+}
+
+void run_token(Context& context, const TokenOptions& options) {
+  const bool word = std::none_of(options.principal.begin(), options.principal.end(),
+                                 [](char c) { return c <= ' ' || c > '~' || c == '#'; });
+  if (options.principal.empty() || !word) {
+    throw usage_problem("PRINCIPAL is \"" + options.principal +
+                        "\", not a word of ASCII characters without #");
+  }
+  Bytes random, hash;
+  if (RAND_bytes(random.data(), static_cast<int>(random.size())) != 1)
+    throw Problem(Exit::kRefused, "UNAVAILABLE", "NO_RANDOMNESS", "no random numbers can be had");
+  const std::string token = hex(random);
+  SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), hash.data());
+  write_secret(options.output, token + '\n');
+  const std::string line =
+      fmt::format("{} {}{}", options.principal, hex(hash), options.admin ? " admin" : "");
+  context.answer({{"line", line}, {"token_file", options.output}}, line + '\n');
+}
+
+}  // namespace
+
+void add_token(CLI::App& app, Context& context) {
+  auto options = std::make_shared<TokenOptions>();
+  CLI::App* command = app.add_subcommand(
+      "token", "Make a token, and print the line for weftd --tokens that knows it by its hash");
+  command->add_option("PRINCIPAL", options->principal, "Whose it is")->option_text(" ")->required();
+  command->add_option("-o,--output", options->output, "Where the token goes, for --token-file")
+      ->type_name("FILE")
+      ->required();
+  command->add_flag("--admin", options->admin, "May use the sessions of all");
+  command->footer("weft token ann -o ann.token >> tokens");
+  command->callback([&context, options] { run_token(context, *options); });
+}
+
+}  // namespace weft::client

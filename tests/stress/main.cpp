@@ -27,6 +27,7 @@ constexpr std::array kTests{
     Test{"slow-readers", weft::stress::slow_readers},
     Test{"view-age", weft::stress::view_age},
     Test{"kill", weft::stress::kills},
+    Test{"full-disk", weft::stress::full_disk},
     Test{"drain", weft::stress::drain},
 };
 

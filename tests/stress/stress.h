@@ -22,6 +22,7 @@ Outcome churn(Form form);
 Outcome slow_readers(Form form);
 Outcome view_age(Form form);
 Outcome kills(Form form);
+Outcome full_disk(Form form);
 Outcome drain(Form form);
 
 }  // namespace weft::stress

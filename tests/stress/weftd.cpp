@@ -1,6 +1,7 @@
 #include "tests/stress/weftd.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -81,6 +82,15 @@ void Weftd::kill_and_start() {
   process_->signal(SIGKILL);
   process_->wait();
   start();
+}
+
+void Weftd::fill_disk(bool full) const {
+  rlimit limit{};
+  if (prlimit(process_->id(), RLIMIT_FSIZE, nullptr, &limit) != 0)
+    throw std::runtime_error("the limit of a weftd cannot be read");
+  limit.rlim_cur = full ? 1 : limit.rlim_max;
+  if (prlimit(process_->id(), RLIMIT_FSIZE, &limit, nullptr) != 0)
+    throw std::runtime_error("the limit of a weftd cannot be set");
 }
 
 int Weftd::terminate() {

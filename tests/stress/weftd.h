@@ -35,6 +35,8 @@ class Weftd {
   Usage usage() const;
 
   void kill_and_start();
+  // Keeps it from writing more, as a full disk does, or lets it again.
+  void fill_disk(bool full) const;
   // Its exit code.
   int terminate();
 

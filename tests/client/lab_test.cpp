@@ -12,10 +12,10 @@ class LabCommandTest : public ClientTest {};
 
 TEST_F(LabCommandTest, PrintsWhatWasAskedWhatWasFoundAndTheErrorWithin80Columns) {
   const Outcome outcome =
-      weft({"lab", "cantilever", "--textile", "wool_tropical", "--isometric", "--spacing", "6"});
+      weft({"lab", "cantilever", "--textile", "wool_tropical", "--spacing", "2.4"});
   EXPECT_EQ(outcome.exit, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("chord angle"));
-  EXPECT_THAT(outcome.out, HasSubstr("note: eq. 2"));
+  EXPECT_THAT(outcome.out, HasSubstr("note: at 2.4 mm"));
   std::istringstream lines(outcome.out);
   for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80u) << line;
 }

@@ -86,7 +86,7 @@ v1::Scene full_scene() {
   textile->set_bend_rigidity_warp_n_m(1e-5);
   textile->set_bend_rigidity_weft_n_m(2e-5);
   textile->set_air_drag_kg_per_m2_s(0.1);
-  measured->mutable_bending()->mutable_isometric();
+  measured->mutable_bending()->mutable_isometric()->set_resist_compression(false);
   v1::Sheet* preset = scene.add_sheets();
   *preset->mutable_grid() = sheet->grid();
   preset->mutable_textile()->set_preset("denim_11oz");

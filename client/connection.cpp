@@ -166,9 +166,10 @@ std::unique_ptr<Connection> Connection::embedded(std::stop_token stop) {
       new Connection(std::move(server), nullptr, "the embedded server", channel, std::move(stop)));
 }
 
-std::unique_ptr<Connection> Connection::another() const {
+std::unique_ptr<Connection> Connection::another(std::stop_token stop) const {
   const auto channel = embedded_ ? embedded_->channel() : dialer_->channel();
-  return std::unique_ptr<Connection>(new Connection(embedded_, dialer_, address_, channel, stop_));
+  return std::unique_ptr<Connection>(
+      new Connection(embedded_, dialer_, address_, channel, std::move(stop)));
 }
 
 Connection::Connection(std::shared_ptr<Embedded> server, std::shared_ptr<const Dialer> dialer,

@@ -36,7 +36,8 @@ class Connection {
                                         const Credentials& credentials = {});
   static std::unique_ptr<Connection> embedded(std::stop_token stop);
   // One more to the same server, for more calls than one carries.
-  std::unique_ptr<Connection> another() const;
+  std::unique_ptr<Connection> another() const { return another(stop_); }
+  std::unique_ptr<Connection> another(std::stop_token stop) const;
   ~Connection();
 
   // The answer, or a Problem.

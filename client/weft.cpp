@@ -16,6 +16,7 @@ constexpr const char* kDescription = "weft: simulates textiles on a server";
 constexpr const char* kFooter = R"(A first run:
   weft scene new --template sphere -o scene.json
   weft session create scene.json --id drape
+  weft serve drape
   weft record drape --run --until-rest -o drape.weft
   weft view drape.weft -o drape.html
   weft render drape.weft -o drape.png
@@ -93,6 +94,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_plot(app, context);
   add_render(app, context);
   add_view(app, context);
+  add_serve(app, context);
   add_script(app, context);
   add_health(app, context);
   add_token(app, context);

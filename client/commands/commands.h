@@ -28,6 +28,7 @@ void add_export(CLI::App& app, Context& context);
 void add_plot(CLI::App& app, Context& context);
 void add_render(CLI::App& app, Context& context);
 void add_view(CLI::App& app, Context& context);
+void add_serve(CLI::App& app, Context& context);
 void add_script(CLI::App& app, Context& context);
 void add_token(CLI::App& app, Context& context);
 void add_health(CLI::App& app, Context& context);

@@ -1,4 +1,4 @@
-// A recording as a scene of three.js. Lengths in m, times in s.
+// What is simulated as a scene of three.js. Lengths in m, times in s.
 'use strict';
 
 const kRamp = ['#3288bd', '#66c2a5', '#abdda4', '#e6f598', '#fee08b', '#fdae61', '#f46d43', '#d53e4f',
@@ -47,6 +47,18 @@ function frontOf(up) {
   return {front, right: up.clone().cross(front)};
 }
 
+// Round points, of so many pixels.
+function dots(size) {
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = 32;
+  const drawing = canvas.getContext('2d');
+  drawing.fillStyle = '#ffffff';
+  drawing.arc(16, 16, 15, 0, 2 * Math.PI);
+  drawing.fill();
+  return new THREE.PointsMaterial(
+    {size, sizeAttenuation: false, map: new THREE.CanvasTexture(canvas), alphaTest: 0.5});
+}
+
 // The shape of a collider as a mesh where it starts; a plane is shown as far as `reach`.
 function colliderMesh(collider, material, centre, reach) {
   const add = (group, geometry, at) => {
@@ -86,10 +98,44 @@ function colliderMesh(collider, material, centre, reach) {
   return group;
 }
 
-// One recording in a scene of its own.
+// Largest strain of a particle's stretch connections, (l - L) / L; 0 where none is stretched.
+function writeStrains(sheets, out, p) {
+  out.fill(0);
+  for (const {first_particle, rows, columns, spacing_m} of sheets) {
+    const stretch = (i, j) => {
+      const length = Math.hypot(p[3 * i] - p[3 * j], p[3 * i + 1] - p[3 * j + 1], p[3 * i + 2] - p[3 * j + 2]);
+      const strain = length / spacing_m - 1;
+      if (strain > out[i]) out[i] = strain;
+      if (strain > out[j]) out[j] = strain;
+    };
+    for (let row = 0; row < rows; ++row) {
+      for (let column = 0; column < columns; ++column) {
+        const i = first_particle + row * columns + column;
+        if (column + 1 < columns) stretch(i, i + 1);
+        if (row + 1 < rows) stretch(i, i + columns);
+      }
+    }
+  }
+}
+
+const kQuantities = {
+  strain: {
+    title: 'Strain, largest at a particle',
+    text: (value) => `${(100 * value).toPrecision(3)} %`,
+    write: (source, out, positions) => writeStrains(source.sheets, out, positions),
+  },
+  speed: {
+    title: 'Speed of a particle',
+    text: (value) => `${value.toPrecision(3)} m/s`,
+    write: (source, out, positions, frame) => source.writeSpeeds(out, frame),
+  },
+};
+
+// A recording, or a session, in a scene of its own. It says what there is ({name, particles, sheets, colliders,
+// origin_m, gravity_m_per_s2, low_m, high_m}) and where the particles are (place, write, writeSpeeds, largest).
 class Pane {
-  constructor(recording, box, up) {
-    this.recording = recording;
+  constructor(source, box, up) {
+    this.source = source;
     this.scene = new THREE.Scene();
     const centre = box.getCenter(new THREE.Vector3());
     const radius = box.getSize(new THREE.Vector3()).length() / 2;
@@ -97,7 +143,7 @@ class Pane {
     this.addCloth();
     this.addBodies(centre, radius);
     this.addGrid(box, up);
-    this.values = new Float32Array(recording.particles);
+    this.values = new Float32Array(source.particles);
     this.paint();
   }
 
@@ -119,7 +165,7 @@ class Pane {
   }
 
   addCloth() {
-    const {particles, sheets, origin_m} = this.recording;
+    const {particles, sheets, origin_m} = this.source;
     const attribute = () =>
       new THREE.BufferAttribute(new Float32Array(3 * particles), 3).setUsage(THREE.DynamicDrawUsage);
     this.position = attribute();
@@ -167,17 +213,26 @@ class Pane {
     this.lattice = new THREE.LineSegments(geometry(threads),
       new THREE.LineBasicMaterial({transparent: true, opacity: 0.25}));
     this.lattice.visible = false;
-    this.pins = new THREE.Points(geometry(pins), new THREE.PointsMaterial({size: 7, sizeAttenuation: false}));
-    this.cloth.add(this.lattice, this.pins);
+    this.pins = new THREE.Points(geometry(pins), dots(8));
+    this.held = new THREE.Points(geometry([0]), dots(16));
+    this.held.material.depthTest = false;  // seen through folds
+    this.held.visible = false;
+    this.cloth.add(this.lattice, this.pins, this.held);
     for (const child of this.cloth.children) child.frustumCulled = false;  // its bounds change with every frame
     this.scene.add(this.cloth);
+  }
+
+  // Marks the particle that a hand holds, if any.
+  hold(particle) {
+    this.held.visible = particle !== undefined;
+    if (this.held.visible) this.held.geometry.setIndex([particle]);
   }
 
   addBodies(centre, radius) {
     // drawn a little behind its place, so that cloth that lies on it hides it
     this.bodyMaterial = new THREE.MeshLambertMaterial(
       {polygonOffset: true, polygonOffsetFactor: 4, polygonOffsetUnits: 4});
-    this.bodies = this.recording.colliders.map((collider) => {
+    this.bodies = this.source.colliders.map((collider) => {
       const mesh = colliderMesh(collider, this.bodyMaterial, centre, 2.5 * radius);
       this.scene.add(mesh);
       return {mesh, path: collider.path};
@@ -194,7 +249,7 @@ class Pane {
     this.scene.add(this.grid);
 
     const centre = box.getCenter(new THREE.Vector3());
-    const ground = this.recording.colliders.find(({plane}) => plane);
+    const ground = this.source.colliders.find(({plane}) => plane);
     if (ground) {
       const {normal, point} = surfaceOf(ground.plane, centre);
       this.grid.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), normal);
@@ -219,17 +274,17 @@ class Pane {
     this.bodyMaterial.color.copy(linear(style('--body')));
     this.grid.material.color.copy(linear(style('--grid')));
     this.lattice.material.color.copy(linear(style('--lattice')));
-    this.pins.material.color.copy(linear(style('--accent')));
+    for (const {material} of [this.pins, this.held]) material.color.copy(linear(style('--accent')));
   }
 
   // Goes to time t; between frames where `between`, else at the frame before.
   show(t, between, quantity) {
-    const place = this.recording.place(t);
+    const place = this.source.place(t);
     if (!between) place.share = 0;
     this.frame = place.frame;
-    this.recording.write(this.position.array, place);
+    this.source.write(this.position.array, place);
     this.writeNormals();
-    if (quantity) kQuantities[quantity].write(this.recording, this.values, this.position.array, place.frame);
+    if (quantity) kQuantities[quantity].write(this.source, this.values, this.position.array, place.frame);
     this.position.needsUpdate = this.normal.needsUpdate = true;
     for (const {mesh, path} of this.bodies) mesh.position.copy(pathOffset(path, t));
   }
@@ -238,7 +293,7 @@ class Pane {
   writeNormals() {
     const p = this.position.array;
     const n = this.normal.array;
-    for (const {first_particle, rows, columns} of this.recording.sheets) {
+    for (const {first_particle, rows, columns} of this.source.sheets) {
       for (let row = 0; row < rows; ++row) {
         for (let column = 0; column < columns; ++column) {
           const i = 3 * (first_particle + row * columns + column);

@@ -20,12 +20,15 @@
 
 namespace weft::client {
 
-// viewer.html with style and scripts in it
-std::string_view page_template();
+// viewer.html and live.html with style and scripts in them, and three.js, which both need
+std::string_view viewer_template();
+std::string_view live_template();
+std::string_view page_libraries();
 
 namespace {
 
 constexpr std::string_view kPlaceOfRecordings = "<!-- recordings -->";
+constexpr std::string_view kPlaceOfLibraries = "<!-- libraries -->";
 constexpr double kStepsOfSpacing = 4096;            // quanta in the finest spacing of a recording
 constexpr double kMostSteps = 1 << 30;              // from the origin
 constexpr std::int64_t kMostNumbers = 100'000'000;  // 400 MB in the browser
@@ -184,7 +187,16 @@ std::string script_text(const Json& json) {
   return safe;
 }
 
+std::string with_libraries(std::string_view page) {
+  const std::size_t place = page.find(kPlaceOfLibraries);
+  return std::string(page.substr(0, place))
+      .append(page_libraries())
+      .append(page.substr(place + kPlaceOfLibraries.size()));
+}
+
 }  // namespace
+
+std::string live_page() { return with_libraries(live_template()); }
 
 PageResult write_page(const PageOrder& order,
                       const std::function<void(const std::string& doing)>& progress) {
@@ -204,7 +216,7 @@ PageResult write_page(const PageOrder& order,
 
   PageResult result;
   Json recordings = Json::array();
-  const std::string_view page = page_template();
+  const std::string page = with_libraries(viewer_template());
   const std::size_t place = page.find(kPlaceOfRecordings);
   OutputFile file(order.path);
   file.write(page.substr(0, place));

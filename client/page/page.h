@@ -42,6 +42,9 @@ struct PageResult {
 PageResult write_page(const PageOrder& order,
                       const std::function<void(const std::string& doing)>& progress);
 
+// The page of weft serve: it asks the server that it comes from.
+std::string live_page();
+
 // The colours of a page's numbers, from the least to the largest: "#3288bd" ...
 std::vector<std::string_view> page_ramp();
 

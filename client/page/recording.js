@@ -1,7 +1,6 @@
 // The recordings that the page holds. Lengths in m, times in s.
 'use strict';
 
-const $ = (id) => document.getElementById(id);
 const page = JSON.parse($('page').textContent);
 const kSameTime = 1e-9;
 
@@ -69,33 +68,13 @@ class Recording {
   }
 
   // Speed of every particle, m/s, on the way from the frame before.
-  writeSpeeds(out, _, frame) {
+  writeSpeeds(out, frame) {
     const before = Math.max(frame - 1, 0);
     const step = this.time_s[frame] - this.time_s[before];
     const scale = step > 0 ? this.quantum_m / step : 0;
     for (let i = 0, a = frame * this.values, b = before * this.values; i < this.particles; ++i, a += 3, b += 3) {
       out[i] = scale * Math.hypot(this.numbers[a] - this.numbers[b],
         this.numbers[a + 1] - this.numbers[b + 1], this.numbers[a + 2] - this.numbers[b + 2]);
-    }
-  }
-
-  // Largest strain of a particle's stretch connections, (l - L) / L; 0 where none is stretched.
-  writeStrains(out, p) {
-    out.fill(0);
-    for (const {first_particle, rows, columns, spacing_m} of this.sheets) {
-      const stretch = (i, j) => {
-        const length = Math.hypot(p[3 * i] - p[3 * j], p[3 * i + 1] - p[3 * j + 1], p[3 * i + 2] - p[3 * j + 2]);
-        const strain = length / spacing_m - 1;
-        if (strain > out[i]) out[i] = strain;
-        if (strain > out[j]) out[j] = strain;
-      };
-      for (let row = 0; row < rows; ++row) {
-        for (let column = 0; column < columns; ++column) {
-          const i = first_particle + row * columns + column;
-          if (column + 1 < columns) stretch(i, i + 1);
-          if (row + 1 < rows) stretch(i, i + columns);
-        }
-      }
     }
   }
 
@@ -113,16 +92,3 @@ class Recording {
     return this.most[quantity];
   }
 }
-
-const kQuantities = {
-  strain: {
-    title: 'Strain, largest at a particle',
-    text: (value) => `${(100 * value).toPrecision(3)} %`,
-    write: (recording, out, positions, frame) => recording.writeStrains(out, positions, frame),
-  },
-  speed: {
-    title: 'Speed of a particle',
-    text: (value) => `${value.toPrecision(3)} m/s`,
-    write: (recording, out, positions, frame) => recording.writeSpeeds(out, positions, frame),
-  },
-};

@@ -2,24 +2,8 @@
 // Lengths in m, times in s.
 'use strict';
 
-class Viewer {
-  constructor() {
-    const canvas = $('view');
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, alpha: true});
-    this.renderer.gammaOutput = true;
-    this.renderer.gammaFactor = 2.2;
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = THREE.PCFSoftShadowMap;
-    this.renderer.setScissorTest(true);
-    this.panes = [];
-    this.ticks = [0];
-    this.time = 0;
-    this.playing = false;
-    this.quantity = '';
-    this.stale = true;
-    this.fitted = true;  // nobody has turned the view yet
-    new ResizeObserver(() => this.resize()).observe($('stage'));
-  }
+class Viewer extends Stage {
+  ticks = [0];
 
   async open(figure) {
     this.pause();
@@ -29,108 +13,12 @@ class Viewer {
     for (const index of figure.recordings) recordings.push(await recordingAt(index));
     message('');
 
-    const box = new THREE.Box3();
-    for (const {low_m, high_m} of recordings) {
-      box.expandByPoint(new THREE.Vector3(...low_m)).expandByPoint(new THREE.Vector3(...high_m));
-    }
-    const reach = box.getSize(new THREE.Vector3()).length();
-    for (const {colliders} of recordings) {
-      for (const collider of colliders) {
-        if (collider.plane) continue;
-        const bounds = new THREE.Box3().setFromObject(colliderMesh(collider));
-        if (bounds.getSize(new THREE.Vector3()).length() < 4 * reach) box.union(bounds);
-      }
-    }
-    const gravity = vector(recordings[0].gravity_m_per_s2);
-    this.up = gravity.length() > 0 ? gravity.negate().normalize() : new THREE.Vector3(0, 1, 0);
-    this.box = box;
-    this.panes = recordings.map((recording) => new Pane(recording, box, this.up));
-    for (const pane of this.panes) pane.lattice.visible = $('lattice').getAttribute('aria-pressed') === 'true';
-
+    this.show(recordings);
     const times = recordings.flatMap(({time_s}) => time_s).sort((a, b) => a - b);
     this.ticks = times.filter((t, k) => k === 0 || t - times[k - 1] > kSameTime);
     $('scrub').max = this.ticks.length - 1;
-    this.layOut(recordings);
     showFacts(figure, recordings, this.panes[0].gridCell);
-    this.makeCamera();
     this.goTo(this.ticks[0]);
-  }
-
-  makeCamera() {
-    this.controls?.dispose();
-    this.camera = new THREE.PerspectiveCamera(32, 1, 0.01, 100);
-    this.camera.up.copy(this.up);
-    this.controls = new THREE.OrbitControls(this.camera, $('view'));
-    this.controls.enableKeys = false;
-    this.controls.screenSpacePanning = true;
-    this.controls.addEventListener('change', () => { this.stale = true; });
-    this.controls.addEventListener('start', () => { this.fitted = false; });
-    this.fit();
-  }
-
-  // From the front, a little from the right and above, as near as the box allows.
-  fit() {
-    const centre = this.box.getCenter(new THREE.Vector3());
-    const radius = this.box.getSize(new THREE.Vector3()).length() / 2;
-    const {front, right} = frontOf(this.up);
-    const from = front.addScaledVector(right, 0.55).addScaledVector(this.up, 0.45).normalize();
-    const x = this.up.clone().cross(from).normalize();
-    const y = from.clone().cross(x);
-    const {width, height} = this.split();
-    const tangent = 0.9 * Math.tan(this.camera.fov / 2 * Math.PI / 180);
-    let distance = 0;
-    for (const corner of cornersOf(this.box)) {
-      corner.sub(centre);
-      const across = Math.max(Math.abs(corner.dot(y)), Math.abs(corner.dot(x)) * height / width);
-      distance = Math.max(distance, corner.dot(from) + across / tangent);
-    }
-    this.camera.near = radius / 100;
-    this.camera.far = 60 * radius;
-    this.camera.position.copy(centre).addScaledVector(from, distance);
-    this.controls.target.copy(centre);
-    this.controls.maxDistance = 30 * radius;
-    this.controls.minDistance = radius / 50;
-    this.controls.update();
-    this.fitted = true;
-    this.stale = true;
-  }
-
-  resize() {
-    if (this.fitted && this.panes.length > 0) this.fit();
-    this.stale = true;
-  }
-
-  // Turns the view by angles, or brings the camera nearer.
-  turn(around, over, nearer = 1) {
-    const offset = this.camera.position.clone().sub(this.controls.target);
-    const right = this.up.clone().cross(offset).normalize();
-    offset.applyAxisAngle(this.up, around).applyAxisAngle(right, over).multiplyScalar(nearer);
-    if (Math.abs(offset.clone().normalize().dot(this.up)) > 0.999) return;
-    this.camera.position.copy(this.controls.target).add(offset);
-    this.controls.update();
-    this.fitted = false;
-    this.stale = true;
-  }
-
-  // The grid of panes whose shorter side is longest.
-  split() {
-    const {clientWidth, clientHeight} = $('stage');
-    const count = Math.max(1, this.panes.length);
-    let best;
-    for (let columns = 1; columns <= count; ++columns) {
-      const rows = Math.ceil(count / columns);
-      const shape = {columns, rows, width: clientWidth / columns, height: clientHeight / rows};
-      if (!best || Math.min(shape.width, shape.height) > Math.min(best.width, best.height)) best = shape;
-    }
-    return best;
-  }
-
-  layOut(recordings) {
-    $('names').replaceChildren(...recordings.map(({name}) => {
-      const label = document.createElement('div');
-      label.append(name, document.createElement('small'));
-      return label;
-    }));
   }
 
   goTo(t) {
@@ -149,7 +37,7 @@ class Viewer {
     if (this.time >= this.ticks[this.ticks.length - 1]) this.goTo(this.ticks[0]);
     this.playing = true;
     this.last = undefined;
-    showPlaying(true);
+    setPlaying(true);
   }
 
   // Ends at a frame, not between two.
@@ -157,65 +45,19 @@ class Viewer {
     if (!this.playing) return;
     this.playing = false;
     this.goTo(this.ticks[indexAt(this.ticks, this.time)]);
-    showPlaying(false);
+    setPlaying(false);
   }
 
-  tick(now) {
-    if (this.playing) {
-      this.goTo(this.time + (this.last === undefined ? 0 : (now - this.last) / 1000 * Number($('speed').value)));
-      this.last = now;
-      if (this.time >= this.ticks[this.ticks.length - 1]) {
-        if ($('repeat').checked) this.goTo(this.ticks[0]); else this.pause();
-      }
+  advance(now) {
+    if (!this.playing) return;
+    this.goTo(this.time + (this.last === undefined ? 0 : (now - this.last) / 1000 * Number($('speed').value)));
+    this.last = now;
+    if (this.time >= this.ticks[this.ticks.length - 1]) {
+      if ($('repeat').checked) this.goTo(this.ticks[0]); else this.pause();
     }
-    if (this.stale && this.panes.length > 0) this.draw();
-    requestAnimationFrame((next) => this.tick(next));
   }
 
-  draw() {
-    this.stale = false;
-    for (const pane of this.panes) pane.show(this.time, this.playing, this.quantity);
-    this.colour();
-
-    const {clientWidth, clientHeight} = $('stage');
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
-    const {columns, rows, width, height} = this.split();
-    const size = this.renderer.getSize(new THREE.Vector2());
-    if (size.x !== clientWidth || size.y !== clientHeight) this.renderer.setSize(clientWidth, clientHeight, false);
-    $('names').style.gridTemplate = `repeat(${rows}, 1fr) / repeat(${columns}, 1fr)`;
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    this.panes.forEach((pane, k) => {
-      $('names').children[k].className = `${k % columns > 0 ? 'right' : ''} ${k >= columns ? 'below' : ''}`;
-      const left = (k % columns) * width;
-      const bottom = clientHeight - (Math.floor(k / columns) + 1) * height;
-      this.renderer.setViewport(left, bottom, width, height);
-      this.renderer.setScissor(left, bottom, width, height);
-      this.renderer.render(pane.scene, this.camera);
-    });
-    showTime(this);
-  }
-
-  // One scale for all panes, so that equal colours are equal values.
-  colour() {
-    $('legend').hidden = !this.quantity;
-    let most = 0;
-    if (this.quantity) {
-      for (const {recording, values} of this.panes) {
-        const largest = $('now').checked ? values.reduce((a, b) => Math.max(a, b), 0)
-          : recording.largest(this.quantity);
-        most = Math.max(most, largest);
-      }
-      $('quantity').textContent = kQuantities[this.quantity].title;
-      $('most').textContent = kQuantities[this.quantity].text(most);
-    }
-    for (const pane of this.panes) pane.colourBy(this.quantity, most);
-  }
-
-  paint() {
-    for (const pane of this.panes) pane.paint();
-    this.stale = true;
-  }
+  drawn() { showTime(this); }
 }
 
 const unpacked = [];
@@ -228,19 +70,7 @@ async function recordingAt(index) {
   return unpacked[index];
 }
 
-function message(text) {
-  $('message').textContent = text;
-  $('message').hidden = !text;
-}
-
-function showPlaying(playing) {
-  $('play').classList.toggle('playing', playing);
-  $('play').setAttribute('aria-label', playing ? 'Pause' : 'Play');
-}
-
 // ---- facts
-
-const digits = (value) => (value !== 0 && Math.abs(value) < 1e-3 ? value.toExponential(2) : value.toPrecision(4));
 
 // Rows of the panel that follow the time: label, and text of a recording's frame.
 const kCurrent = [
@@ -252,20 +82,6 @@ const kCurrent = [
   ['substeps', (r, k) => r.stats && `${r.stats.substep_count[k]}`],
 ];
 let currentCells = [];
-
-// A last short word, such as a unit, stays with the one before it.
-function cell(tag, text, attributes = {}) {
-  const made = document.createElement(tag);
-  made.textContent = text.replace(/ (?=[^ ]{1,6}$)/, '\u00a0');
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  return made;
-}
-
-function row(...cells) {
-  const made = document.createElement('tr');
-  made.append(...cells);
-  return made;
-}
 
 function showFacts(figure, recordings, gridCell) {
   $('caption').textContent = figure.caption;
@@ -319,12 +135,12 @@ function showTime(viewer) {
   const clock = `${viewer.time.toFixed(3)} / ${last.toFixed(3)} s`;
   $('clock').textContent = clock;
   $('scrub').setAttribute('aria-valuetext', clock);
-  viewer.panes.forEach(({recording, frame}, pane) => {
+  viewer.panes.forEach(({source, frame}, pane) => {
     kCurrent.forEach(([, text], k) => {
-      currentCells[k][pane].textContent = (text(recording, frame) ?? 'not recorded').replaceAll(' ', '\u00a0');
+      currentCells[k][pane].textContent = (text(source, frame) ?? 'not recorded').replaceAll(' ', '\u00a0');
     });
-    const strain = recording.stats && (100 * recording.stats.largest_strain[frame]).toPrecision(3);
-    $('names').children[pane].lastChild.textContent = `frame ${recording.first_frame + frame}` +
+    const strain = source.stats && (100 * source.stats.largest_strain[frame]).toPrecision(3);
+    $('names').children[pane].lastChild.textContent = `frame ${source.first_frame + frame}` +
       (strain ? `, strain up to ${strain}\u00a0%` : '');
   });
 }
@@ -347,31 +163,10 @@ function makeFigures(viewer) {
   return choose(buttons[0], page.figures[0]);
 }
 
-function toggleLattice(viewer) {
-  const shown = $('lattice').getAttribute('aria-pressed') !== 'true';
-  $('lattice').setAttribute('aria-pressed', shown);
-  for (const pane of viewer.panes) pane.lattice.visible = shown;
-  viewer.stale = true;
-}
-
-function setTheme(viewer, theme) {
-  document.documentElement.dataset.theme = theme;
-  viewer.paint();
-}
-
 function listen(viewer) {
   const toggle = () => (viewer.playing ? viewer.pause() : viewer.play());
   const end = () => viewer.step(Infinity);
   const start = () => viewer.step(-Infinity);
-  const theme = () => setTheme(viewer, document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark');
-  const colour = () => {
-    viewer.quantity = $('colour').value === 'cloth' ? '' : $('colour').value;
-    viewer.stale = true;
-  };
-  const nextColour = () => {
-    $('colour').selectedIndex = ($('colour').selectedIndex + 1) % $('colour').length;
-    colour();
-  };
   $('play').addEventListener('click', toggle);
   $('first').addEventListener('click', start);
   $('back').addEventListener('click', () => viewer.step(-1));
@@ -380,46 +175,21 @@ function listen(viewer) {
     viewer.pause();
     viewer.goTo(viewer.ticks[Number($('scrub').value)]);
   });
-  $('colour').addEventListener('change', colour);
-  $('now').addEventListener('change', () => { viewer.stale = true; });
-  $('lattice').addEventListener('click', () => toggleLattice(viewer));
-  $('fit').addEventListener('click', () => viewer.fit());
-  $('theme').addEventListener('click', theme);
-
-  const keys = {
+  viewer.listen({
     ' ': toggle, Home: start, End: end,
     ArrowLeft: (frames) => viewer.step(-frames), ArrowRight: (frames) => viewer.step(frames),
-    f: () => viewer.fit(), l: () => toggleLattice(viewer), t: theme, c: nextColour,
-    w: () => viewer.turn(0, -0.1), s: () => viewer.turn(0, 0.1),
-    a: () => viewer.turn(-0.1, 0), d: () => viewer.turn(0.1, 0),
-    '+': () => viewer.turn(0, 0, 0.9), '=': () => viewer.turn(0, 0, 0.9), '-': () => viewer.turn(0, 0, 1.1),
-  };
-  document.addEventListener('keydown', (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches('select')) return;
-    if (event.key === ' ' && event.target.matches('button, input, summary')) return;
-    const action = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    if (!action) return;
-    event.preventDefault();
-    action(event.shiftKey ? 10 : 1);
   });
 }
 
 async function main() {
   document.title = page.title;
   $('title').textContent = page.title;
-  $('ramp').style.background = `linear-gradient(90deg, ${kRamp.join(', ')})`;
-  document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
   if (typeof DecompressionStream === 'undefined') {
     message('This browser is too old for the page: it lacks DecompressionStream (2023).');
     return;
   }
-  let viewer;
-  try {
-    viewer = new Viewer();
-  } catch {
-    message('This browser shows no WebGL, which the page draws with.');
-    return;
-  }
+  const viewer = makeStage(Viewer);
+  if (!viewer) return;
   listen(viewer);
   await makeFigures(viewer);
   document.body.dataset.state = 'ready';

@@ -61,8 +61,8 @@ RecordingResult record(Connection& connection, const RecordingOrder& order,
         break;
       case v1::StreamFramesResponse::kProgress:
         writer->commit();
-        result.complete =
-            !order.to && !order.until_rest && has_ended(message->progress(), result.tally);
+        result.complete = !order.to && !order.until_rest && !order.through_pauses &&
+                          has_ended(message->progress(), result.tally);
         break;
       case v1::StreamFramesResponse::kRepair:  // counted with its frame
       case v1::StreamFramesResponse::MESSAGE_NOT_SET:

@@ -12,7 +12,7 @@
 namespace weft::client {
 
 // What is recorded, where, and when it ends: after the frame `to`, or at rest, or when the session,
-// having advanced, is paused again.
+// having advanced, is paused again, or when it is stopped.
 struct RecordingOrder {
   std::string session;  // "sessions/flag"
   std::string path;
@@ -20,6 +20,7 @@ struct RecordingOrder {
   std::optional<std::int64_t> from;  // absent: the newest frame
   std::optional<std::int64_t> to;
   bool until_rest = false;
+  bool through_pauses = false;  // a pause does not end it
   bool run = false;  // lets the session run, as far as it is recorded
   bool velocities = false;
   v1::FrameEncoding encoding = v1::FRAME_ENCODING_FLOAT32;

@@ -1,60 +1,29 @@
-// The page of `weft view` in Chromium, by what a person does. Usage:
-//   node --test tests/page/   with WEFT and CHROMIUM naming the programs, PICTURES a directory
+// The page of `weft view` in Chromium, by what a person does; ./dev test-page runs it.
 import assert from 'node:assert/strict';
-import {execFileSync} from 'node:child_process';
-import {createHash} from 'node:crypto';
-import {mkdtempSync, rmSync, statSync} from 'node:fs';
-import {tmpdir} from 'node:os';
-import {join} from 'node:path';
+import {statSync} from 'node:fs';
 import {pathToFileURL} from 'node:url';
-import {after, before, test} from 'node:test';
-import {chromium} from 'playwright-core';
+import {before, test} from 'node:test';
+import {canvas, file, open as openUrl, picture, plain, settle, weft} from './browser.mjs';
 
-const directory = mkdtempSync(join(tmpdir(), 'weft-page-'));
-const file = (name) => join(directory, name);
-const weft = (...words) => execFileSync(process.env.WEFT, words, {stdio: ['ignore', 'ignore', 'inherit']});
-let browser;
-
-before(async () => {
+before(() => {
   for (const [name, stiffness] of [['limp', '0'], ['stiff', '0.3']]) {
     weft('scene', 'new', '--template', 'paper-3', '--bend', stiffness, '-o', file(`${name}.json`));
     weft('record', file(`${name}.json`), '--embedded', '--to', '40', '-o', file(`${name}.weft`));
   }
   weft('view', file('limp.weft'), file('stiff.weft'), '-o', file('pair.html'), '--title', 'Limp and stiff');
   weft('view', file('stiff.weft'), '-o', file('one.html'));
-  browser = await chromium.launch({
-    executablePath: process.env.CHROMIUM,
-    args: ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
-  });
 });
 
-after(async () => {
-  await browser?.close();
-  rmSync(directory, {recursive: true});
-});
-
-// The page from disk, without a network, standing at its first frame; what goes wrong in it fails the test.
+// The page from disk, without a network, standing at its first frame.
 async function open(name, options = {}) {
-  const context = await browser.newContext({reducedMotion: 'reduce', offline: true, viewport: {width: 1280, height: 800}, ...options});
-  const page = await context.newPage();
-  const problems = [];
-  page.on('pageerror', (error) => problems.push(error.message));
-  page.on('console', (said) => said.type() === 'error' && problems.push(said.text()));
-  page.on('request', (request) => request.url().startsWith('file:') || problems.push(request.url()));
-  await page.goto(pathToFileURL(file(name)).href);
+  const {page, problems, context} = await openUrl(pathToFileURL(file(name)).href,
+    {reducedMotion: 'reduce', offline: true, asks: (url) => url.startsWith('file:'), ...options});
   await page.waitForSelector('body[data-state=ready]');
   await settle(page);
   return {page, close: async () => { await context.close(); assert.deepEqual(problems, []); }};
 }
 
-// Until what was asked for has been drawn.
-const settle = (page) => page.evaluate(() => new Promise((done) =>
-  requestAnimationFrame(() => requestAnimationFrame(() => requestAnimationFrame(done)))));
-const picture = (page, name) => page.screenshot({path: join(process.env.PICTURES, `${name}.png`)});
-const plain = (text) => text.replaceAll('\u00a0', ' ');
 const clock = (page) => page.textContent('#clock');
-// What the canvas shows, to be compared.
-const canvas = async (page) => createHash('sha256').update(await page.locator('#view').screenshot()).digest('hex');
 
 test('one recording is shown with its facts', async () => {
   const {page, close} = await open('one.html');

@@ -1,0 +1,181 @@
+// Sessions of a running server, through the server of this page: client/serve/live_server.h says how. Lengths in
+// m, times in s.
+'use strict';
+
+const pause = (seconds) => new Promise((done) => { setTimeout(done, 1000 * seconds); });
+const shortName = (name) => name.slice(name.indexOf('/') + 1);
+
+// One sentence of what {error} says, the field first where one is to blame.
+function sentenceOf({message: text, violations}) {
+  return violations.length === 1 ? `${violations[0].field}: ${violations[0].description}` : text;
+}
+
+// Calls a method, "weft.v1.SessionService/RunSession", and returns its answer.
+async function call(method, request = {}) {
+  let response;
+  try {
+    response = await fetch(`/${method}`, {method: 'POST', body: JSON.stringify(request)});
+  } catch {
+    throw new Error('weft serve does not answer; is it running?');
+  }
+  if (response.status === 200) return response.json();
+  const said = await response.text();
+  throw new Error(said.startsWith('{') ? sentenceOf(JSON.parse(said).error) : said.trim());
+}
+const session = (method, request) => call(`weft.v1.SessionService/${method}`, request);
+
+// A stream of the server: each message is answered with one.
+class Conversation {
+  constructor(method) {
+    this.socket = new WebSocket(`ws://${location.host}/${method}`);
+    this.socket.binaryType = 'arraybuffer';
+    this.opened = new Promise((done, fail) => {
+      this.socket.onopen = done;
+      this.fail = fail;
+    });
+    this.opened.catch(() => {});  // who asks will hear
+    this.socket.onmessage = ({data}) => this.take(data);
+    this.socket.onclose = () => this.fail(new Error('weft serve does not answer; is it running?'));
+  }
+
+  // Sends a request, or nothing, and waits for the next message.
+  async ask(request) {
+    await this.opened;
+    return new Promise((done, fail) => {
+      this.done = done;
+      this.fail = fail;
+      this.socket.send(request ? JSON.stringify(request) : '');
+    });
+  }
+
+  take(data) {
+    if (typeof data !== 'string') {
+      const length = new Uint32Array(data, 0, 1)[0];
+      const said = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+      this.done({...said, positions: new Float32Array(data, 4 + length)});
+      return;
+    }
+    const said = data ? JSON.parse(data) : {error: {message: 'The server ended the stream.', violations: []}};
+    if (said.error) this.fail(new Error(sentenceOf(said.error))); else this.done(said);
+  }
+
+  close() { this.socket.close(); }
+}
+
+// A session as it is seen: the newest frame, and the one before.
+class Sight {
+  constructor(session, {sheets, uid}) {
+    const {scene, name} = session;
+    this.session = session;
+    this.name = shortName(name);
+    this.uid = uid;
+    this.sheets = sheets.map((layout, k) => ({
+      ...layout,
+      spacing_m: scene.sheets[k].grid.spacing_m,
+      pinned: scene.sheets[k].pins.flatMap(({particles}) => particles),
+    }));
+    this.particles = this.sheets.reduce((sum, {rows, columns}) => sum + rows * columns, 0);
+    this.colliders = scene.colliders;
+    this.gravity_m_per_s2 = scene.environment.gravity_m_per_s2;
+    this.origin_m = [0, 0, 0];
+    this.most = {strain: 0, speed: 0};  // so far
+  }
+
+  take({frame, positions}) {
+    this.before = this.frame;
+    this.frame = {...frame, positions};
+  }
+
+  sheetOf(particle) {
+    return this.sheets.find(({first_particle, rows, columns}) => particle < first_particle + rows * columns);
+  }
+
+  place() { return {frame: this.frame.number}; }
+
+  // From x of all particles, then y, then z.
+  write(out) {
+    const {positions} = this.frame;
+    for (let i = 0; i < this.particles; ++i) {
+      for (let axis = 0; axis < 3; ++axis) out[3 * i + axis] = positions[axis * this.particles + i];
+    }
+  }
+
+  // Speed of every particle, m/s, on the way from the frame that was seen before.
+  writeSpeeds(out) {
+    out.fill(0);
+    const step = this.before ? this.frame.time_s - this.before.time_s : 0;
+    if (!(step > 0)) return;
+    const n = this.particles;
+    const [a, b] = [this.frame.positions, this.before.positions];
+    for (let i = 0; i < n; ++i) {
+      out[i] = Math.hypot(a[i] - b[i], a[n + i] - b[n + i], a[2 * n + i] - b[2 * n + i]) / step;
+    }
+  }
+
+  largest(quantity, values) {
+    this.most[quantity] = values.reduce((a, b) => Math.max(a, b), this.most[quantity]);
+    return this.most[quantity];
+  }
+
+  // Where the sheets are, and where those that hang from pins will come to.
+  get bounds() {
+    const {positions} = this.frame;
+    const box = new THREE.Box3();
+    const at = (i) => new THREE.Vector3(
+      positions[i], positions[this.particles + i], positions[2 * this.particles + i]);
+    for (let i = 0; i < this.particles; ++i) box.expandByPoint(at(i));
+    const down = vector(this.gravity_m_per_s2).normalize();
+    for (const {first_particle, rows, columns, spacing_m, pinned} of this.sheets) {
+      const reach = spacing_m * Math.max(rows, columns);
+      for (const i of pinned) box.expandByPoint(at(first_particle + i).addScaledVector(down, reach));
+    }
+    return box;
+  }
+  get low_m() { return this.bounds.min.toArray(); }
+  get high_m() { return this.bounds.max.toArray(); }
+}
+
+// A hand that holds a particle and leads it to the newest place it was given. When it goes, it lets go.
+class Hand {
+  constructor(name, sheet, particle, applied) {
+    this.of = {sheet, particle};
+    this.name = name;
+    this.sequence = 0;
+    this.stream = new Conversation('weft.v1.SessionService/Interact');
+    this.end = this.work(applied);
+  }
+
+  async act(action) {
+    const {applied_frame} = await this.stream.ask({session: this.name, sequence: ++this.sequence, action});
+    return applied_frame;
+  }
+
+  lead(target) {
+    this.target_m = {x: target.x, y: target.y, z: target.z};
+    this.wake?.();
+  }
+
+  release() {
+    this.released = true;
+    this.wake?.();
+  }
+
+  // Tells from which frame each place shows.
+  async work(applied) {
+    try {
+      applied(await this.act({grab: this.of}));
+      while (this.target_m || !this.released) {
+        if (this.target_m) {
+          const {target_m} = this;
+          this.target_m = undefined;
+          applied(await this.act({drag: {...this.of, target_m}}));
+        } else {
+          await new Promise((wake) => { this.wake = wake; });
+        }
+      }
+      applied(await this.act({release: this.of}));
+    } finally {
+      this.stream.close();
+    }
+  }
+}

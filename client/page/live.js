@@ -10,14 +10,21 @@ function trouble(of, text) {
   $('trouble').hidden = !first;
 }
 
-// Something a person asked for: the answer, or none, and why is shown until the next one.
+// Why something that a person asked for was not done; shown for a while.
+function refuse(error) {
+  trouble('request', error.message);
+  clearTimeout(refuse.timer);
+  refuse.timer = setTimeout(() => trouble('request', ''), 10000);
+}
+
+// Something a person asked for: the answer, or none.
 async function attempt(work) {
   try {
     const answer = await work();
     trouble('request', '');
     return answer;
   } catch (error) {
-    trouble('request', error.message);
+    refuse(error);
     return undefined;
   }
 }
@@ -213,12 +220,12 @@ class Live extends Stage {
     this.plane = new THREE.Plane().setFromNormalAndCoplanarPoint(toward, picked.at);
     const {name, first_particle} = this.sight.sheetOf(picked.particle);
     const particle = picked.particle - first_particle;
+    const held = `particle ${particle}${this.sight.sheets.length > 1 ? ` of ${name}` : ''}`;
     this.hand = new Hand(this.name, name, particle, (frame) =>
-      doing(`Holds particle ${particle} of ${name}: from frame ${frame} on${this.isRunning ? '' : '; it moves when the session runs'}.`));
+      doing(`Leads ${held} from frame ${frame} on${this.isRunning ? '' : ', when it runs'}.`));
     this.panes[0].hold(picked.particle);
     this.stale = true;
-    this.hand.end.then(() => doing('Let go.'), (error) => trouble('request', error.message))
-      .finally(() => this.letGo());
+    this.hand.end.then(() => doing('Let go.'), refuse).finally(() => this.letGo());
   }
 
   drag(event) {
@@ -248,7 +255,7 @@ class Live extends Stage {
 function sessionRow(live, {name, frame, time_s, at_rest, lateness_s, failure, ...rest}) {
   const state = stateOf(rest);
   const button = cell('button', '', {class: state, 'aria-current': name === live.name});
-  const late = lateness_s > 0.1 ? `, ${lateness_s.toFixed(1)} s late` : '';
+  const late = state === 'running' && lateness_s > 0.1 ? `, ${lateness_s.toFixed(1)} s late` : '';
   button.append(cell('span', '', {class: 'dot'}), cell('span', shortName(name), {class: 'name'}),
     cell('span', at_rest && state !== 'failed' ? `${state}, at rest` : state, {class: 'state'}),
     cell('small', failure || `frame ${frame}, ${time_s.toFixed(3)} s${late}`));

@@ -21,7 +21,7 @@ struct RecordingOrder {
   std::optional<std::int64_t> to;
   bool until_rest = false;
   bool through_pauses = false;  // a pause does not end it
-  bool run = false;  // lets the session run, as far as it is recorded
+  bool run = false;             // lets the session run, as far as it is recorded
   bool velocities = false;
   v1::FrameEncoding encoding = v1::FRAME_ENCODING_FLOAT32;
   std::chrono::seconds patience{60};  // with a connection that is gone

@@ -7,7 +7,6 @@
 #include <boost/beast.hpp>
 #include <chrono>
 #include <optional>
-#include <string_view>
 #include <utility>
 
 #include "client/problem.h"

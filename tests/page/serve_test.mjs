@@ -9,6 +9,7 @@ const programs = new Set();
 let address;
 let url;
 let weftd;
+let served;
 const weft = (...words) => run(...words, '--server', address);
 const scene = (session) => JSON.parse(weft('session', 'get', session, '--json')).scene;
 
@@ -31,6 +32,13 @@ const startWeftd = async (port) => {
   [weftd, address] = await start('weftd', '--port', port, '--data-dir', file('data'), '--log-level', 'off');
 };
 
+async function serve(port) {
+  let where;
+  [served, where] = await start('weft', 'serve', '--http', `127.0.0.1:${port}`, '--server', address,
+    '--recordings', file('recordings'));
+  url = `http://${where}/`;
+}
+
 before(async () => {
   await startWeftd('0');
   for (const [name, ...options] of [['ball', 'sphere'], ['curtain', 'hang', '--rows', '15', '--columns', '15']]) {
@@ -38,9 +46,7 @@ before(async () => {
     weft('session', 'create', file(`${name}.json`), '--id', name);
   }
   mkdirSync(file('recordings'));
-  const [, served] = await start('weft', 'serve', '--http', '127.0.0.1:0', '--server', address,
-    '--recordings', file('recordings'));
-  url = `http://${served}/`;
+  await serve('0');
 });
 
 after(async () => {
@@ -50,7 +56,7 @@ after(async () => {
 async function open(session = '', options = {}) {
   const own = (asked) => [url, url.replace('http', 'ws')].some((start) => asked.startsWith(start));
   const {page, problems, context} = await openUrl(`${url}${session && '#'}${session}`,
-    {asks: own, complains: (text) => text.includes('Failed to load resource'), ...options});
+    {asks: own, complains: (text) => /Failed to load resource|WebSocket connection/.test(text), ...options});
   await page.waitForSelector('body[data-state=ready]');
   await settle(page);
   return {page, close: async () => { await context.close(); assert.deepEqual(problems, []); }};
@@ -125,7 +131,8 @@ test('the mouse takes the cloth by a particle, which follows it and is let go', 
     const {x, y, width, height} = await page.locator('#view').boundingBox();
     await page.mouse.move(x + width / 2, y + 0.35 * height);
     await page.mouse.down();
-    await says(page, 'doing', /Holds particle \d+ of sheet: from frame \d+ on/);
+    await says(page, 'doing', /Leads particle \d+ from frame \d+ on/);
+    assert.equal((await page.locator('#view').boundingBox()).width, width);  // whatever is said below it
     particle = Number((await page.textContent('#doing')).match(/particle (\d+)/)[1]);
     await page.mouse.move(x + width / 2 + 150, y + 0.35 * height - 60, {steps: 10});
     await pass(page, 60);
@@ -181,7 +188,7 @@ test('what the server refuses is one sentence, and the slider goes back', async 
   await close();
 });
 
-test('a server that goes away and comes back is said so, and shown again', async () => {
+test('servers that go away and come back are said so, and shown again', async () => {
   const {page, close} = await open('curtain', {colorScheme: 'dark'});
   const last = await clock(page);
   await stop(weftd);
@@ -190,6 +197,11 @@ test('a server that goes away and comes back is said so, and shown again', async
   await startWeftd(address.split(':')[1]);
   await page.locator('#trouble').waitFor({state: 'hidden'});
   assert.equal(await clock(page), last);
+
+  assert.equal(await stop(served, 'SIGINT'), 0);
+  await says(page, 'trouble', /weft serve does not answer/);
+  await serve(new URL(url).port);
+  await page.locator('#trouble').waitFor({state: 'hidden'});
   await play(page);
   await pass(page, 10);
   await pause(page);
@@ -205,7 +217,7 @@ test('on a phone everything fits the width, and a finger drags the cloth', async
   const fingers = await page.context().newCDPSession(page);
   const touch = (type, ...points) => fingers.send('Input.dispatchTouchEvent', {type, touchPoints: points.map(([px, py]) => ({x: px, y: py}))});
   await touch('touchStart', [x + width / 2, y + 0.4 * height]);
-  await says(page, 'doing', /Holds particle/);
+  await says(page, 'doing', /Leads particle/);
   for (let k = 1; k <= 8; ++k) await touch('touchMove', [x + width / 2 + 8 * k, y + 0.4 * height - 4 * k]);
   await pass(page, 20);
   await picture(page, 'serve-phone');
@@ -223,7 +235,7 @@ test('a hand lets go when its page is closed', async () => {
   const {x, y, width, height} = await page.locator('#view').boundingBox();
   await page.mouse.move(x + width / 2, y + 0.35 * height);
   await page.mouse.down();
-  await says(page, 'doing', /Holds particle/);
+  await says(page, 'doing', /Leads particle/);
   const particle = Number((await page.textContent('#doing')).match(/particle (\d+)/)[1]);
   const place = `${Math.floor(particle / 15)},${particle % 15}`;
   assert.throws(() => weft('act', 'grab', 'curtain', place));

@@ -35,7 +35,8 @@ void run_export(Context& context, const ExportOptions& options) {
 void add_export(CLI::App& app, Context& context) {
   const std::map<std::string, ExportFormat> formats{
       {"obj", ExportFormat::kObj},   {"pc2", ExportFormat::kPc2}, {"mdd", ExportFormat::kMdd},
-      {"gltf", ExportFormat::kGltf}, {"vtk", ExportFormat::kVtk}, {"csv", ExportFormat::kCsv}};
+      {"gltf", ExportFormat::kGltf}, {"vtk", ExportFormat::kVtk}, {"usda", ExportFormat::kUsda},
+      {"csv", ExportFormat::kCsv}};
   auto options = std::make_shared<ExportOptions>();
   ExportOrder& order = options->order;
   CLI::App* command =
@@ -45,10 +46,10 @@ void add_export(CLI::App& app, Context& context) {
       ->add_option("-f,--format", order.format,
                    "obj: a directory of meshes\npc2, mdd: point caches\n"
                    "gltf: an animated mesh, .glb\nvtk: a collection of meshes, .pvd\n"
-                   "csv: a row for every frame")
+                   "usda: an animated mesh in USD text\ncsv: a row for every frame")
       ->required()
       ->transform(CLI::CheckedTransformer(formats))
-      ->option_text("obj|pc2|mdd|gltf|vtk|csv, REQUIRED");
+      ->option_text("obj|pc2|mdd|gltf|vtk|usda|csv, REQUIRED");
   command->add_option("-o,--output", order.path, "File to write; for obj a directory")
       ->type_name("PATH")
       ->required();

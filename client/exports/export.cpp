@@ -68,7 +68,17 @@ std::vector<std::int64_t> frames_to_export(RecordingReader& recording, const Exp
   return numbers;
 }
 
+UsdStage stage_of(const RecordingReader& recording, const std::vector<std::int64_t>& numbers) {
+  const auto [first, last] = std::minmax_element(numbers.begin(), numbers.end());
+  const v1::Vector3& gravity = recording.scene().environment().gravity_m_per_s2();
+  return {.first_frame = *first,
+          .last_frame = *last,
+          .frames_per_second = 1 / recording.header().frame_step_s(),
+          .up_axis = std::abs(gravity.z()) > std::abs(gravity.y()) ? 'Z' : 'Y'};
+}
+
 std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& part,
+                                         const RecordingReader& recording,
                                          const std::vector<std::int64_t>& numbers) {
   switch (order.format) {
     case ExportFormat::kObj:
@@ -81,6 +91,8 @@ std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& p
       return make_gltf_writer(order.path, part.sheets, part.count, numbers.size());
     case ExportFormat::kVtk:
       return make_vtk_writer(order.path, part.sheets);
+    case ExportFormat::kUsda:
+      return make_usd_writer(order.path, part.sheets, stage_of(recording, numbers));
     case ExportFormat::kCsv:
       return make_csv_writer(order.path, part.count);
   }
@@ -100,7 +112,7 @@ ExportResult export_recording(RecordingReader& recording, const ExportOrder& ord
   if (std::filesystem::equivalent(order.path, recording.path(), error))
     throw unwritable(order.path, "it is the recording itself");
   recording.read(numbers.front());  // its particles are as many as the header says, or it throws
-  const auto writer = make_writer(order, part, numbers);
+  const auto writer = make_writer(order, part, recording, numbers);
   ExportResult result{.frames = 0, .particles = static_cast<std::int64_t>(part.count)};
   for (const std::int64_t number : numbers) {
     const v1::Frame frame = recording.read(number);

@@ -50,4 +50,18 @@ std::unique_ptr<FrameWriter> make_gltf_writer(const std::string& path,
 std::unique_ptr<FrameWriter> make_vtk_writer(const std::string& path,
                                              const std::vector<v1::SheetLayout>& sheets);
 
+// What USD needs to know of time and space; a frame's time code is its number.
+struct UsdStage {
+  std::int64_t first_frame = 0;
+  std::int64_t last_frame = 0;
+  double frames_per_second = 60;
+  char up_axis = 'Y';  // or Z
+};
+
+// USD text: one mesh of all sheets, its faces in a subset for each; points as time samples,
+// float32.
+std::unique_ptr<FrameWriter> make_usd_writer(const std::string& path,
+                                             const std::vector<v1::SheetLayout>& sheets,
+                                             const UsdStage& stage);
+
 }  // namespace weft::client

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <iterator>
 #include <pugixml.hpp>
 #include <sstream>
 
@@ -250,6 +251,41 @@ TEST_F(ExportsTest, VtkIsACollectionOfMeshes) {
   }
   EXPECT_EQ(frame, kLast + 1);
   EXPECT_EQ(weft({"export", file_, "-f", "vtk", "-o", path("cloth.vtk")}).exit, 2);
+}
+
+// The numbers of a list that follows a text.
+std::vector<double> list_after(const std::string& file, const std::string& text) {
+  const std::size_t place = file.find(text);
+  EXPECT_NE(place, std::string::npos) << text;
+  const std::size_t start = file.find('[', place + text.size() - 1) + 1;
+  std::string list = file.substr(start, file.find(']', start) - start);
+  for (char& c : list)
+    if (c == '(' || c == ')' || c == ',') c = ' ';
+  std::istringstream words(list);
+  return {std::istream_iterator<double>(words), {}};
+}
+
+TEST_F(ExportsTest, UsdIsAMeshWithASampleForEveryFrameAndASubsetForEverySheet) {
+  ask({"export", file_, "--format", "usda", "--frames", "4:", "-o", path("cloth.usda")});
+  const std::string file = read_file(path("cloth.usda"));
+  EXPECT_THAT(file, AllOf(::testing::StartsWith("#usda 1.0\n"), HasSubstr("metersPerUnit = 1\n"),
+                          HasSubstr("upAxis = \"Y\""), HasSubstr("timeCodesPerSecond = 60\n"),
+                          HasSubstr("startTimeCode = 4\n"), HasSubstr("endTimeCode = 12\n")));
+  EXPECT_EQ(std::count(file.begin(), file.end(), '{'), std::count(file.begin(), file.end(), '}'));
+  const std::size_t cells = 3 * 4 + 2 * 5;
+  EXPECT_EQ(list_after(file, "faceVertexCounts = ["), std::vector<double>(cells, 4));
+  const auto corners = list_after(file, "faceVertexIndices = [");
+  ASSERT_EQ(corners.size(), 4 * cells);
+  EXPECT_EQ(corners[4 * 12], 20);  // the first cell of the second sheet
+  EXPECT_EQ(list_after(file.substr(file.find("GeomSubset \"right\"")), "indices = [")[0], 12);
+  for (std::int64_t frame = 4; frame <= kLast; ++frame) {
+    const auto points = list_after(file, "\n        " + std::to_string(frame) + ": [");
+    ASSERT_EQ(points.size(), 3 * kParticles);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      ASSERT_FLOAT_EQ(static_cast<float>(points[i]),
+                      static_cast<float>(recorded(frame, i % 3, i / 3)));
+  }
+  EXPECT_EQ(weft({"export", file_, "-f", "usda", "-o", path("cloth.usd")}).exit, 2);
 }
 
 // A binary glTF file.

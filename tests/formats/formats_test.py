@@ -84,6 +84,21 @@ def check_gltf(folder, recording, _):
     return [("gltf", f"gltf-validator {report['validatorVersion']}", 0, 0)]
 
 
+def check_usd(folder, recording, truth):
+    files = [folder / "a.usda"] + [folder / f"{frame}.usda" for frame in range(len(truth))]
+    weft("export", recording, "--format=usda", "-o", files[0])
+    for frame, file in enumerate(files[1:]):
+        weft("export", recording, "--format=usda", f"--frames={frame}:{frame}", "-o", file)
+    read = json.loads(subprocess.check_output(["node", HERE / "read_usd.mjs", *files], text=True))
+    off = 0
+    for mesh, points in zip(read["meshes"], [truth[0], *truth]):
+        assert mesh["meshes"] == 1, f"{mesh['meshes']} meshes"
+        assert mesh["triangles"] == sum(2 * (r - 1) * (c - 1) for r, c in SHEETS.values())
+        xyz = mesh["points"]
+        off = max(off, largest(list(zip(xyz[0::3], xyz[1::3], xyz[2::3])), points))
+    return [("usda", f"tinyusdz {read['version']}", off, FLOAT32)]
+
+
 def check_blender(folder, recording, truth):
     first = 0
     for name, (rows, columns) in SHEETS.items():
@@ -112,7 +127,7 @@ def main():
         recording, truth = record(folder)
         particles = len(truth[0])
         print(f"{len(truth)} frames of {particles} particles, largest difference to the recording:")
-        for check in (check_vtk, check_gltf, check_blender):
+        for check in (check_vtk, check_gltf, check_usd, check_blender):
             try:
                 for what, reader, off, most in check(folder, recording, truth):
                     good = off <= most

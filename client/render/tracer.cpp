@@ -9,7 +9,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <memory>
 #include <numbers>
 #include <optional>
 #include <stdexcept>

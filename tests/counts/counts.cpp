@@ -64,6 +64,13 @@ Simulation bending_taken_away() {
   return made;
 }
 
+// Looked at for values that are not finite alone.
+Simulation without_guard() {
+  Scene scene = curtain();
+  scene.solver.max_repairs = 0;
+  return simulation(scene);
+}
+
 Simulation asleep() {
   Scene scene = curtain();
   scene.environment.gravity.setZero();
@@ -89,6 +96,7 @@ int main(int count, char** arguments) {
       {"no_damping", without_damping},
       {"no_bending", without_bending},
       {"bending_taken_away", bending_taken_away},
+      {"no_guard", without_guard},
       {"asleep", asleep}};
   const auto found = count == 2 ? cases.find(arguments[1]) : cases.end();
   if (found == cases.end()) {

@@ -37,6 +37,11 @@ class Counts(unittest.TestCase):
     def test_wind_is_paid_for_by_scenes_with_wind_alone(self):
         self.assertGreater(instructions("wind"), 1.1 * instructions("plain"))
 
+    def test_the_guard_costs_less_than_a_hundredth_of_a_frame_of_32_substeps(self):
+        # templates take 39 and more
+        unguarded = instructions("no_guard")
+        self.assertLess(instructions("plain") - unguarded, 0.01 * 2 * unguarded)
+
     def test_a_scene_asleep_costs_nothing(self):
         self.assertLess(instructions("asleep"), 1e-4 * instructions("plain"))
 

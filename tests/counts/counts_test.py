@@ -38,7 +38,7 @@ class Counts(unittest.TestCase):
         self.assertGreater(instructions("wind"), 1.1 * instructions("plain"))
 
     def test_the_guard_costs_less_than_a_hundredth_of_a_frame_of_32_substeps(self):
-        # templates take 39 and more
+        # templates take 44 and more
         unguarded = instructions("no_guard")
         self.assertLess(instructions("plain") - unguarded, 0.01 * 2 * unguarded)
 

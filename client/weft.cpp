@@ -90,6 +90,8 @@ void add_commands(CLI::App& app, Context& context) {
   add_info(app, context);
   add_verify(app, context);
   add_diff(app, context);
+  add_cut(app, context);
+  add_join(app, context);
   add_export(app, context);
   add_plot(app, context);
   add_render(app, context);

@@ -24,6 +24,8 @@ void add_record(CLI::App& app, Context& context);
 void add_info(CLI::App& app, Context& context);
 void add_verify(CLI::App& app, Context& context);
 void add_diff(CLI::App& app, Context& context);
+void add_cut(CLI::App& app, Context& context);
+void add_join(CLI::App& app, Context& context);
 void add_export(CLI::App& app, Context& context);
 void add_plot(CLI::App& app, Context& context);
 void add_render(CLI::App& app, Context& context);

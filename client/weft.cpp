@@ -103,6 +103,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_load(app, context);
   add_demo(app, context);
   add_completion(app, context);
+  add_help(app);
 }
 
 }  // namespace
@@ -124,6 +125,12 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
   try {
     if (arguments.size() > 1 && arguments[0] == "completion" && arguments[1] == "words") {
       terminal.out << completions(app, {arguments.begin() + 2, arguments.end()}, context);
+      return static_cast<int>(Exit::kDone);
+    }
+    if (!arguments.empty() && arguments[0] == "help") {
+      const auto options = std::find_if(arguments.begin(), arguments.end(),
+                                        [](const auto& word) { return word.starts_with('-'); });
+      terminal.out << help_of(app, {arguments.begin() + 1, options});
       return static_cast<int>(Exit::kDone);
     }
     std::reverse(arguments.begin(), arguments.end());  // as CLI11 wants them

@@ -37,6 +37,10 @@ void add_health(CLI::App& app, Context& context);
 void add_load(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
 void add_completion(CLI::App& app, Context& context);
+void add_help(CLI::App& app);
+// What `weft scene new --help` says, of the words "scene", "new". Throws where there is no such
+// command.
+std::string help_of(const CLI::App& app, const std::vector<std::string>& words);
 // What may stand for the last of the words after "weft", a line each.
 std::string completions(CLI::App& app, std::vector<std::string> words, Context& context);
 

@@ -156,6 +156,11 @@ TEST_F(CommandsTest, HelpIsAnAnswer) {
   EXPECT_EQ(help.exit, 0);
   EXPECT_THAT(help.out, AllOf(HasSubstr("Exit codes"), HasSubstr("record"), HasSubstr("export")));
   EXPECT_THAT(weft({"record", "--help"}).out, HasSubstr("--until-rest"));
+  EXPECT_EQ(weft({"help"}).out, help.out);
+  EXPECT_EQ(weft({"help", "scene", "new"}).out, weft({"scene", "new", "--help"}).out);
+  const Outcome unknown = weft({"help", "knit"});
+  EXPECT_EQ(unknown.exit, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("there is no command \"knit\""));
 }
 
 TEST_F(CommandsTest, AShellCompletesCommandsOptionsValuesAndSessions) {

@@ -240,7 +240,7 @@ class SpeedPage {
   void memory() {
     page_.text("## Memory");
     for (const char* size : {"31x31", "101x101"})
-      if (const Run* run = find(fmt::format("memory/{}", size)))
+      if (const Run* run = find(fmt::format("memory/{}/iterations:1", size)))
         page_.text(
             fmt::format("A simulation of {} particles holds {:.0f} KiB.", size, run->bytes / 1024));
   }

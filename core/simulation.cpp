@@ -126,7 +126,8 @@ struct Simulation::State {
 
   State(Scene given, SolverFactory factory);
   SheetDefinition stepped(std::size_t sheet) const;
-  Plan plan_with(std::size_t sheet, const Textile& textile);
+  void put_textile(std::size_t sheet, const Textile& textile);
+  Plan plan_now() const;
   std::optional<StepRefusal> set_textile(std::size_t sheet, const Textile& textile);
   bool change_textiles();
   void bind_forces();
@@ -284,12 +285,14 @@ void Simulation::State::go_on(const Course& course, double old_dt,
   }
 }
 
-// Puts the textile in its place.
-Plan Simulation::State::plan_with(std::size_t sheet, const Textile& textile) {
+void Simulation::State::put_textile(std::size_t sheet, const Textile& textile) {
   scene.sheets[sheet].textile = textile;
   set_textile_of(scene, stepped(sheet), sheets[sheet]);
+}
+
+Plan Simulation::State::plan_now() const {
   std::vector<Matrix3Xd> x;
-  for (const Sheet& each : sheets) x.push_back(each.good.x);
+  for (const Sheet& sheet : sheets) x.push_back(sheet.good.x);
   return plan_for(x);
 }
 
@@ -298,9 +301,10 @@ std::optional<StepRefusal> Simulation::State::set_textile(std::size_t sheet,
   const double dt = plan.step.substep;
   const Course before = course();
   const Textile old = scene.sheets[sheet].textile;
-  Plan made = plan_with(sheet, textile);
+  put_textile(sheet, textile);
+  Plan made = plan_now();
   if (const auto refused = find_refusal(made.step, scene.solver)) {
-    plan_with(sheet, old);
+    put_textile(sheet, old);
     return refused;
   }
   plan = std::move(made);
@@ -531,8 +535,9 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
     if (const auto refused = state.set_textile(index, textile)) return refused;
     sheet.ramp.reset();
   } else {
-    const Plan plan = state.plan_with(index, textile);
-    state.plan_with(index, now);
+    state.put_textile(index, textile);
+    const Plan plan = state.plan_now();
+    state.put_textile(index, now);
     if (const auto refused = find_refusal(plan.step, state.scene.solver)) return refused;
     const std::int64_t begin = state.frame;
     sheet.ramp = {now, textile, begin, begin + static_cast<std::int64_t>(frames)};
@@ -597,7 +602,7 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
     plans = plans || state.planned_inverse_mass(s) != planned[s];
   }
   if (plans) {
-    Plan plan = state.plan_for(course.x);
+    Plan plan = state.plan_now();
     if (const auto refused = find_refusal(plan.step, state.scene.solver)) {
       state.adopt(before);
       return refused;

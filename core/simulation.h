@@ -84,8 +84,7 @@ class Simulation {
                                          double duration = 0);
   // The textile that a sheet has, or that its textile changes to.
   const Textile& target_textile(std::size_t index) const;
-  // Whether the last frame was computed with another textile than was set: on the way to it, or the
-  // first there.
+  // Whether the last frame's textile was another than that of the frame before it, over a duration.
   bool textile_changed() const;
 
   // What holds particles and moves colliders now.

@@ -149,20 +149,20 @@ int folds(const std::vector<double>& radii) {
 }
 
 // What light from above shows of a disc at rest.
-void look(const std::string& how, const Specimen& disc, const Matrix3Xd& rest, LabReport& report) {
+void look(const Specimen& disc, const Matrix3Xd& rest, LabReport& report) {
   constexpr int kAngles = 360;
   const Shadow shadow(disc.mesh, rest), flat(disc.mesh, disc.start);
   const double held = std::numbers::pi * kHeldRadius * kHeldRadius;
-  LabCurve outline{join(1000 * disc.sheet.grid.spacing, " mm", how), {"x m", "z m"}, {}};
+  LabCurve outline{join(1000 * disc.sheet.grid.spacing, " mm"), {"x m", "z m"}, {}};
   std::vector<double> radii;
   for (int k = 0; k <= kAngles; ++k) {
     const double angle = 2 * std::numbers::pi * k / kAngles, radius = shadow.radius(angle);
     if (k < kAngles) radii.push_back(radius / flat.radius(angle));
     outline.rows.push_back({radius * std::cos(angle), radius * std::sin(angle)});
   }
-  report.values.push_back(value("drape coefficient" + how, "%", disc, std::nullopt,
+  report.values.push_back(value("drape coefficient", "%", disc, std::nullopt,
                                 100 * (shadow.area() - held) / (flat.area() - held)));
-  report.values.push_back(value("folds" + how, "", disc, std::nullopt, folds(radii)));
+  report.values.push_back(value("folds", "", disc, std::nullopt, folds(radii)));
   report.curves.push_back(std::move(outline));
 }
 
@@ -188,7 +188,7 @@ void hang(const LabOrder& order, double spacing, const std::stop_token& stop, La
     start = settle(cut_disc(textile, Isometric{}, kRadius, kHeldRadius, spacing), start).x;
   const Equilibrium rest = settle(disc, start);
   note_unsettled(rest, tolerance, report);
-  look("", disc, rest.x, report);
+  look(disc, rest.x, report);
 }
 
 }  // namespace

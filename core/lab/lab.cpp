@@ -15,7 +15,6 @@ namespace {
 
 constexpr int kMostParticles = 6000;  // of a specimen: seconds of Newton's method
 constexpr double kWidth = 0.025;      // of a strip, m: ASTM D1388
-constexpr const char* kChordAngle = "chord angle";
 
 int steps_of(double length, double spacing) {
   return std::max(1, static_cast<int>(std::lround(length / spacing)));
@@ -195,9 +194,9 @@ struct Cantilever {
     note_unsettled(rest, tolerance, report);
     return rest;
   }
-  LabValue angle(const std::string& quantity, const Equilibrium& rest) const {
+  LabValue angle(const Equilibrium& rest) const {
     const Vector3d tip = rest.x.col(specimen.at(row, columns + kHeld - 1));
-    return value(quantity, "degrees", specimen, chord_angle(asked.x(), asked.y()),
+    return value("chord angle", "degrees", specimen, chord_angle(asked.x(), asked.y()),
                  chord_angle(tip.x(), -tip.y()));
   }
 };
@@ -206,7 +205,7 @@ void hang_over(const MeasuredTextile& textile, const LabOrder& order, double ove
                const std::stop_token& stop, LabReport& report) {
   Cantilever strip(textile, order.bending, overhang, columns);
   const Equilibrium rest = strip.settle(stop, report);
-  report.values.push_back(strip.angle(kChordAngle, rest));
+  report.values.push_back(strip.angle(rest));
   LabCurve curve{
       join("spacing ", 1000 * strip.specimen.sheet.grid.spacing, " mm"), {"x m", "drop m"}, {}};
   for (int c = Cantilever::kHeld - 1; c < columns + Cantilever::kHeld; ++c) {

@@ -34,13 +34,10 @@ void order_by_frames(std::vector<RecordingReader>& recordings, FrameRange& range
   range.first = std::max(range.first, recordings.front().first_frame());
   std::int64_t last = recordings.front().first_frame() - 1;
   for (const RecordingReader& recording : recordings) {
-    if (recording.first_frame() > last + 1 && last < range.last &&
-        recording.first_frame() > range.first) {
-      throw refused(
-          "FRAMES_MISSING",
-          fmt::format("no recording holds frames {} to {}", std::max(last + 1, range.first),
-                      std::min(recording.first_frame() - 1, range.last)));
-    }
+    const std::int64_t from = std::max(last + 1, range.first);
+    const std::int64_t to = std::min(recording.first_frame() - 1, range.last);
+    if (from <= to)
+      throw refused("FRAMES_MISSING", fmt::format("no recording holds frames {} to {}", from, to));
     last = std::max(last, recording.last_frame());
   }
   range.last = std::min(range.last, last);

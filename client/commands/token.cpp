@@ -1,11 +1,14 @@
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/rand.h>
 #include <openssl/sha.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
-#include <fstream>
+#include <cerrno>
+#include <cstring>
 
 #include "client/commands/commands.h"
 
@@ -24,12 +27,14 @@ std::string hex(const Bytes& bytes) { return fmt::format("{:02x}", fmt::join(byt
 
 // In a new file that nobody else can read.
 void write_secret(const std::string& path, const std::string& text) {
-  namespace fs = std::filesystem;
-  if (fs::exists(path)) throw unwritable(path, "it is there; a token is not written over another");
-  std::ofstream file(path);
-  std::error_code error;
-  fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write, error);
-  if (!(file << text << std::flush)) throw unwritable(path, std::strerror(errno));
+  const int file = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  if (file < 0 && errno == EEXIST)
+    throw unwritable(path, "it is there; a token is not written over another");
+  const bool written =
+      file >= 0 && write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  const int error = errno;
+  if (file >= 0) close(file);
+  if (!written) throw unwritable(path, std::strerror(error));
 }
 
 void run_token(Context& context, const TokenOptions& options) {

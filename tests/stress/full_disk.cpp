@@ -1,7 +1,8 @@
 #include <fmt/format.h>
 
-#include <atomic>
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <thread>
 #include <vector>
 
@@ -26,32 +27,48 @@ class Caller {
         }) {}
 
   // Calls that were refused as they should be, with anything else, and acknowledged.
-  std::atomic<int> refused = 0, wrong = 0, acknowledged = 0;
+  struct Counts {
+    int refused = 0, wrong = 0, acknowledged = 0;
+  };
+  Counts counts() const {
+    const std::lock_guard lock(mutex_);
+    return counts_;
+  }
 
   // Waits until so many more are counted.
-  static void await(const std::atomic<int>& count, int more) {
-    const auto deadline = Clock::now() + std::chrono::minutes(2);
-    for (const int enough = count + more; count < enough;) {
-      if (Clock::now() > deadline) throw std::runtime_error("calls stay away for two minutes");
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
+  void await(int Counts::*count, int more) {
+    std::unique_lock lock(mutex_);
+    const int enough = counts_.*count + more;
+    if (!changed_.wait_for(lock, std::chrono::minutes(2), [&] { return counts_.*count >= enough; }))
+      throw std::runtime_error("calls stay away for two minutes");
   }
 
  private:
+  static constexpr std::chrono::milliseconds kPace{20}, kRetry{5};
+
   void change(Recorded& one, int number, const std::stop_token& stop) {
     Change change{change_of(one.session, number)};
     while (!stop.stop_requested()) try {
         change.applied_frame =
             connection_->call(&Sessions::UpdateTextile, change.request).applied_frame();
         one.changes.push_back(change);
-        ++acknowledged;
-        return std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        note(&Counts::acknowledged);
+        return std::this_thread::sleep_for(kPace);
       } catch (const client::Problem& problem) {
-        ++(problem.reason == "STORE_UNWRITABLE" ? refused : wrong);
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        note(problem.reason == "STORE_UNWRITABLE" ? &Counts::refused : &Counts::wrong);
+        std::this_thread::sleep_for(kRetry);
       }
   }
 
+  void note(int Counts::*count) {
+    const std::lock_guard lock(mutex_);
+    ++(counts_.*count);
+    changed_.notify_all();
+  }
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  Counts counts_;
   const std::unique_ptr<client::Connection> connection_;
   std::jthread thread_;
 };
@@ -68,18 +85,18 @@ Outcome full_disk(Form form) {
   Hearing hearing(4);
   std::vector<Recorded> all = record_sessions(weftd, *connection, scene, hearing);
 
-  int refused = 0, wrong = 0, acknowledged = 0;
+  Caller::Counts counts;
   {
     Caller caller(weftd, all);
     for (int round = 0; round < rounds; ++round) {
-      Caller::await(caller.acknowledged, 10);
+      caller.await(&Caller::Counts::acknowledged, 10);
       weftd.fill_disk(true);
-      Caller::await(caller.refused, 10);
+      caller.await(&Caller::Counts::refused, 10);
       hearing.wait_for_all_after(Clock::now());  // sessions go on
       weftd.fill_disk(false);
     }
-    Caller::await(caller.acknowledged, 10);
-    refused = caller.refused, wrong = caller.wrong, acknowledged = caller.acknowledged;
+    caller.await(&Caller::Counts::acknowledged, 10);
+    counts = caller.counts();
   }
   weftd.kill_and_start();
   hearing.wait_for_all_after(Clock::now());
@@ -98,11 +115,11 @@ Outcome full_disk(Form form) {
       .figure = fmt::format("full {} times: {} calls refused as STORE_UNWRITABLE, {} otherwise; "
                             "{} frames in {} recordings, {} lost, {} differing from the core "
                             "with the {} changes acknowledged",
-                            rounds, refused, wrong, faults.frames, all.size(), faults.lost,
-                            faults.differing, changes),
+                            rounds, counts.refused, counts.wrong, faults.frames, all.size(),
+                            faults.lost, faults.differing, changes),
       .hold = "0, 0, 0; sessions go on",
-      .counts = faults.frames > 0 && faults.lost == 0 && faults.differing == 0 && wrong == 0 &&
-                acknowledged > 0};
+      .counts = faults.frames > 0 && faults.lost == 0 && faults.differing == 0 &&
+                counts.wrong == 0 && counts.acknowledged > 0};
 }
 
 }  // namespace weft::stress

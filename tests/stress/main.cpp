@@ -28,6 +28,8 @@ constexpr std::array kTests{
     Test{"view-age", weft::stress::view_age},
     Test{"kill", weft::stress::kills},
     Test{"full-disk", weft::stress::full_disk},
+    Test{"read-only-disk", weft::stress::read_only_disk},
+    Test{"slow-disk", weft::stress::slow_disk},
     Test{"drain", weft::stress::drain},
 };
 

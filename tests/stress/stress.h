@@ -23,6 +23,8 @@ Outcome slow_readers(Form form);
 Outcome view_age(Form form);
 Outcome kills(Form form);
 Outcome full_disk(Form form);
+Outcome read_only_disk(Form form);
+Outcome slow_disk(Form form);
 Outcome drain(Form form);
 
 }  // namespace weft::stress

@@ -1,7 +1,6 @@
 #include "tests/stress/weftd.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -39,11 +38,14 @@ Weftd::Weftd(std::vector<std::string> flags) : flags_(flags) {
 Weftd::~Weftd() = default;
 
 void Weftd::start() {
+  std::ofstream(path("disk")) << static_cast<char>(Disk::kGood);
   std::vector<std::string> flags{"--host",     host_,        "--port",      port_,
                                  "--data-dir", path("data"), "--log-level", "warn"};
   flags.insert(flags.end(), flags_.begin(), flags_.end());
   const std::string output = path("weftd.txt");
-  process_ = std::make_unique<testing::Process>("weftd", flags, output);
+  const std::vector<std::string> environment{"LD_PRELOAD=" WEFT_BAD_DISK_LIBRARY,
+                                             "WEFT_BAD_DISK=" + path("disk")};
+  process_ = std::make_unique<testing::Process>("weftd", flags, output, 0, environment);
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   const std::string listening = "weftd listening on " + host_ + ":";
   for (;;) {
@@ -84,13 +86,8 @@ void Weftd::kill_and_start() {
   start();
 }
 
-void Weftd::fill_disk(bool full) const {
-  rlimit limit{};
-  if (prlimit(process_->id(), RLIMIT_FSIZE, nullptr, &limit) != 0)
-    throw std::runtime_error("the limit of a weftd cannot be read");
-  limit.rlim_cur = full ? 1 : limit.rlim_max;
-  if (prlimit(process_->id(), RLIMIT_FSIZE, &limit, nullptr) != 0)
-    throw std::runtime_error("the limit of a weftd cannot be set");
+void Weftd::set_disk(Disk disk) const {
+  std::ofstream(path("disk"), std::ios::in) << static_cast<char>(disk);
 }
 
 int Weftd::terminate() {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/connection.h"
+#include "tests/stress/disk/disk.h"
 #include "tests/support/service/process.h"
 #include "tests/support/temporary_directory.h"
 
@@ -35,8 +36,8 @@ class Weftd {
   Usage usage() const;
 
   void kill_and_start();
-  // Keeps it from writing more, as a full disk does, or lets it again.
-  void fill_disk(bool full) const;
+  // How its disk behaves from now on.
+  void set_disk(Disk disk) const;
   // Its exit code.
   int terminate();
 

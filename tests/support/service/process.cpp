@@ -11,13 +11,18 @@
 namespace weft::testing {
 
 Process::Process(const std::string& program, const std::vector<std::string>& arguments,
-                 const std::string& output, std::size_t file_size_limit) {
+                 const std::string& output, std::size_t file_size_limit,
+                 std::vector<std::string> environment) {
   std::string path = std::string(WEFT_BIN_DIR) + '/' + program;
   std::vector<std::string> words = arguments;
   words.insert(words.begin(), path);
   std::vector<char*> argv;
   for (auto& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
+  std::vector<char*> envp;
+  for (auto& variable : environment) envp.push_back(variable.data());
+  for (char** variable = environ; *variable != nullptr; ++variable) envp.push_back(*variable);
+  envp.push_back(nullptr);
   const int out = ::open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
 
   pid_ = ::fork();
@@ -27,7 +32,7 @@ Process::Process(const std::string& program, const std::vector<std::string>& arg
     ::dup2(out, STDERR_FILENO);
     const rlimit limit{.rlim_cur = file_size_limit, .rlim_max = file_size_limit};
     if (file_size_limit > 0) ::setrlimit(RLIMIT_FSIZE, &limit);
-    ::execv(argv[0], argv.data());
+    ::execve(argv[0], argv.data(), envp.data());
     ::_exit(127);
   }
   ::close(out);

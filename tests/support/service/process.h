@@ -10,9 +10,11 @@ namespace weft::testing {
 // One of the programs that were built, running.
 class Process {
  public:
-  // What it writes goes to the file `output`. A limit of 0 bytes for files it writes: none.
+  // What it writes goes to the file `output`. A limit of 0 bytes for files it writes: none. It has
+  // this process's environment and what `environment` adds, "NAME=value".
   Process(const std::string& program, const std::vector<std::string>& arguments,
-          const std::string& output, std::size_t file_size_limit = 0);
+          const std::string& output, std::size_t file_size_limit = 0,
+          std::vector<std::string> environment = {});
   ~Process();  // kills it
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;

@@ -69,6 +69,11 @@ BreakingProxy::BreakingProxy(const std::string& target, NetworkFault fault)
 
 BreakingProxy::~BreakingProxy() { close(); }
 
+std::string BreakingProxy::asked() const {
+  const std::lock_guard lock(mutex_);
+  return asked_;
+}
+
 void BreakingProxy::close() {
   closed_ = true;
   if (acceptor_.joinable()) acceptor_.join();
@@ -90,7 +95,11 @@ bool BreakingProxy::pass(int from, int to, bool answers, std::size_t& answered) 
   const ssize_t received = ::recv(from, buffer.data(), buffer.size(), 0);
   if (received <= 0) return false;
   const auto size = static_cast<std::size_t>(received);
-  if (!answers) return send_all(to, buffer.data(), size);
+  if (!answers) {
+    const std::lock_guard lock(mutex_);
+    asked_.append(buffer.data(), size);
+    return send_all(to, buffer.data(), size);
+  }
   for (std::size_t begin = 0; begin < size; begin += fault_.slice) {
     if (fault_.delay.count() > 0) std::this_thread::sleep_for(fault_.delay);
     if (!send_all(to, buffer.data() + begin, std::min(fault_.slice, size - begin))) return false;

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstddef>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -31,6 +32,8 @@ class BreakingProxy {
 
   const std::string& address() const { return address_; }
   int broken() const { return broken_; }
+  // What clients sent, of one after the other.
+  std::string asked() const;
   // Breaks every connection and takes no more.
   void close();
 
@@ -46,6 +49,8 @@ class BreakingProxy {
   std::atomic<int> breaks_left_;
   std::atomic<int> broken_ = 0;
   std::atomic<bool> closed_ = false;
+  mutable std::mutex mutex_;
+  std::string asked_;
   int listener_;
   std::thread acceptor_;
   std::vector<std::thread> relays_;  // the acceptor's

@@ -1,7 +1,11 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
+#include <unistd.h>
 
+#include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -10,6 +14,25 @@
 #include "server/server.h"
 
 namespace {
+
+constexpr unsigned kMostDraining = 8;  // s; systemd and docker wait 10 before they kill
+
+// Waits for one of the signals. systemd hears meanwhile that the server answers, if it wants to.
+int await(const sigset_t& signals, weft::Server& server) {
+  std::uint64_t patience_us = 0;
+  int signal = 0;
+  if (sd_watchdog_enabled(0, &patience_us) <= 0) {
+    sigwait(&signals, &signal);
+    return signal;
+  }
+  const std::chrono::microseconds turn(patience_us / 3);
+  const auto seconds = std::chrono::floor<std::chrono::seconds>(turn);
+  const timespec pause{seconds.count(), std::chrono::nanoseconds(turn - seconds).count()};
+  while ((signal = sigtimedwait(&signals, nullptr, &pause)) < 0)
+    if (server.answers(std::chrono::ceil<std::chrono::milliseconds>(turn)))
+      sd_notify(0, "WATCHDOG=1");
+  return signal;
+}
 
 int serve(const weft::Config& config) {
   // blocked before there are threads, so that none but this one takes them
@@ -30,8 +53,10 @@ int serve(const weft::Config& config) {
   if (config.server.metrics) spdlog::info("metrics at http://{}/metrics", server.metrics_address());
   spdlog::info("version {}, {} workers", WEFT_VERSION, config.server.worker_threads);
 
-  int signal = 0;
-  sigwait(&signals, &signal);
+  sd_notify(0, "READY=1");
+  const int signal = await(signals, server);
+  sd_notify(0, "STOPPING=1");
+  alarm(kMostDraining);
   spdlog::info("{}: draining", signal == SIGINT ? "SIGINT" : "SIGTERM");
   server.stop();
   spdlog::info("stopped");

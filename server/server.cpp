@@ -108,6 +108,15 @@ std::string Server::metrics_address() const {
   return parts_->metrics ? parts_->metrics->address() : "";
 }
 
+bool Server::answers(std::chrono::milliseconds time) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + time);
+  v1::ServerStats stats;
+  const auto status =
+      v1::ServerService::NewStub(in_process_channel())->GetServerStats(&context, {}, &stats);
+  return status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED;  // a refusal is an answer
+}
+
 std::shared_ptr<grpc::Channel> Server::in_process_channel() {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(-1);

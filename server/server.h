@@ -36,6 +36,9 @@ class Server {
   const std::string& address() const { return address_; }  // "127.0.0.1:41234"; empty without host
   std::string metrics_address() const;                     // empty without metrics
 
+  // Whether a call comes back within the time.
+  bool answers(std::chrono::milliseconds time);
+
   // A channel without a network.
   std::shared_ptr<grpc::Channel> in_process_channel();
 

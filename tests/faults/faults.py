@@ -60,7 +60,7 @@ def main():
     for fault in faults:
         if (COPY / fault["file"]).read_text().count(fault["sound"]) != 1:
             sys.exit(f"{fault['file']} has not once: {fault['sound']}")
-    subprocess.check_call(["cmake", "--preset", "release", "--log-level=ERROR"], cwd=COPY,
+    subprocess.check_call(["cmake", "--preset", "release", "-DWEFT_WERROR=OFF", "--log-level=ERROR"], cwd=COPY,
                           stdout=subprocess.DEVNULL)
     build({fault["suite"] for fault in faults})
     missed = 0

@@ -1,12 +1,18 @@
 #include <fcntl.h>
 #include <spawn.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <csignal>
 #include <optional>
+#include <string>
+#include <vector>
 
+#include "tests/support/service/process.h"
 #include "tests/support/service/service.h"
+#include "tests/support/temporary_directory.h"
 
 namespace weft::testing {
 namespace {
@@ -66,6 +72,45 @@ TEST(Weftd, ServesOnAFreePortThatItPrintsAndEndsCleanly) {
     EXPECT_TRUE(v1::ServerService::NewStub(channel)->GetServerInfo(&context, {}, &info).ok());
     EXPECT_EQ(weftd.end(signal), 0);
   }
+}
+
+// What systemd hears of a process, and tells it by its environment.
+class Notified {
+ public:
+  Notified() {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    directory_.path("notify").copy(address.sun_path, sizeof address.sun_path - 1);
+    EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  }
+  ~Notified() { close(socket_); }
+
+  std::vector<std::string> environment() const {
+    return {"NOTIFY_SOCKET=" + directory_.path("notify"), "WATCHDOG_USEC=100000"};
+  }
+  std::string hear() const {
+    char text[100];
+    const ssize_t size = recv(socket_, text, sizeof text, 0);
+    return {text, size > 0 ? static_cast<std::size_t>(size) : 0};
+  }
+
+ private:
+  TemporaryDirectory directory_;
+  const int socket_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+};
+
+TEST(Weftd, TellsSystemdThatItServesThatItAnswersAndThatItEnds) {
+  const Notified systemd;
+  const TemporaryDirectory directory;
+  Process weftd("weftd", {"--port=0", "--data-dir=none"}, directory.path("output"), 0,
+                systemd.environment());
+  EXPECT_EQ(systemd.hear(), "READY=1");
+  for (int turn = 0; turn < 3; ++turn) EXPECT_EQ(systemd.hear(), "WATCHDOG=1");
+  weftd.signal(SIGTERM);
+  std::string heard = systemd.hear();
+  while (heard == "WATCHDOG=1") heard = systemd.hear();
+  EXPECT_EQ(heard, "STOPPING=1");
+  EXPECT_EQ(weftd.wait(), 0);
 }
 
 TEST(Weftd, EndsStreamsWithAReasonWhenItIsTerminated) {

@@ -31,6 +31,7 @@ constexpr std::array kTests{
     Test{"read-only-disk", weft::stress::read_only_disk},
     Test{"slow-disk", weft::stress::slow_disk},
     Test{"drain", weft::stress::drain},
+    Test{"sizing", weft::stress::sizing},
 };
 
 int usage() {

@@ -26,5 +26,6 @@ Outcome full_disk(Form form);
 Outcome read_only_disk(Form form);
 Outcome slow_disk(Form form);
 Outcome drain(Form form);
+Outcome sizing(Form form);
 
 }  // namespace weft::stress

@@ -76,6 +76,7 @@ Usage Weftd::usage() const {
   return {.cpu_s = (user_ticks + kernel_ticks) / static_cast<double>(sysconf(_SC_CLK_TCK)),
           .memory = 1024 * number_behind(status, "VmRSS:"),
           .most_memory = 1024 * number_behind(status, "VmHWM:"),
+          .stored = number_behind(text_of(proc / "io"), "\nwrite_bytes:"),
           .threads = static_cast<int>(number_behind(status, "Threads:")),
           .files = static_cast<int>(std::distance(begin(files), end(files)))};
 }

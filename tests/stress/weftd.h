@@ -17,6 +17,7 @@ struct Usage {
   double cpu_s = 0;              // so far
   std::int64_t memory = 0;       // bytes resident
   std::int64_t most_memory = 0;  // so far
+  std::int64_t stored = 0;       // bytes that went to disk so far
   int threads = 0;
   int files = 0;
 };

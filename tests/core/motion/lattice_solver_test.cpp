@@ -245,7 +245,7 @@ std::uint64_t hash_of_run(Precision precision, std::int64_t target) {
 // Golden hashes: they guard that results repeat to the bit, not that they are right.
 TEST(Repeatability, RunsHaveTheSameBitsOnEveryProcessorWithFma) {
   int targets = 0;
-  for (const std::int64_t target : {HWY_AVX2, HWY_AVX3}) {
+  for (const std::int64_t target : {HWY_AVX2, HWY_AVX3, HWY_NEON}) {
     if ((hwy::SupportedTargets() & target) == 0) continue;
     ++targets;
     EXPECT_EQ(hash_of_run(Precision::kSingle, target), 3607182440198313410u)

@@ -28,16 +28,21 @@ void restore(Backend& backend, LeftSession left) {
     spdlog::warn("{} was created with numerics {}; its frames may differ in their last bits now",
                  session_name(identity.id), identity.numerics_id);
   }
-  const auto session =
-      std::make_shared<Session>(identity, std::move(simulation), backend.host(),
-                                backend.store->log_of(identity.uid, left.past.log.size()));
-  backend.registry.restore(session);
-  left.past.snapshot = backend.store->snapshot(identity.uid, left.past.reach);
+  const auto entries = left.past.first + static_cast<std::int64_t>(left.past.log.size());
+  const auto session = std::make_shared<Session>(identity, std::move(simulation), backend.host(),
+                                                 backend.store->log_of(identity.uid, entries));
+  left.past.snapshot = backend.store->snapshot(identity.uid, left.past);
   if (left.past.snapshot && left.past.snapshot->numerics_id != numerics_id()) {
     spdlog::warn("{} goes on from frame {}, which numerics {} computed", session_name(identity.id),
                  left.past.snapshot->simulation.frame, left.past.snapshot->numerics_id);
   }
-  session->restore(std::move(left.past));
+  if (!session->restore(std::move(left.past))) {
+    return add_damaged(backend,
+                       {identity.id, identity.uid,
+                        "no snapshot of it can be used, and its log does not reach back to "
+                        "frame 0"});
+  }
+  backend.registry.restore(session);
 }
 
 }  // namespace

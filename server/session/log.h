@@ -68,9 +68,10 @@ class SessionLog {
                      const Written& written) = 0;
 
   // Takes a snapshot, if there is one, to be written in the background. False where it does not. A
-  // restart begins at the last one, or at the last one not after `history_from`.
+  // restart may begin at any frame from `oldest` on, so what lies before the last two snapshots not
+  // after it may be forgotten.
   using Take = std::function<std::shared_ptr<const SessionSnapshot>()>;
-  virtual bool offer(const Take& take, std::optional<std::int64_t> history_from) = 0;
+  virtual bool offer(const Take& take, std::int64_t oldest) = 0;
 };
 
 // Keeps nothing: the session ends with the process.
@@ -80,9 +81,7 @@ class NoLog final : public SessionLog {
              const Written& written) override {
     written({});
   }
-  bool offer(const Take& /*take*/, std::optional<std::int64_t> /*history_from*/) override {
-    return false;
-  }
+  bool offer(const Take& /*take*/, std::int64_t /*oldest*/) override { return false; }
 };
 
 }  // namespace weft

@@ -66,14 +66,15 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
   history_.push(make_frame({}), 0);
 }
 
-void Session::restore(SessionPast past) {
-  if (past.snapshot) begin_at(*past.snapshot, past.log);
+bool Session::restore(SessionPast past) {
+  const bool begun = past.snapshot && begin_at(*past.snapshot, past);
+  if (!begun && past.first > 0) return false;
   {
     std::lock_guard lock(mutex_);
     reach_ = past.reach;
-    if (past.log.empty()) return;
+    if (!begun && past.log.empty()) return true;
     set_state(SessionState::kRestoring);
-    restoring_ = Restoring{{std::make_move_iterator(past.log.begin() + entries_),
+    restoring_ = Restoring{{std::make_move_iterator(past.log.begin() + entries_ - past.first),
                             std::make_move_iterator(past.log.end())},
                            past.reach.frame};
     if (past.reach.history_from) readers_until_ = Clock::now() + kHoldAfterRestore;
@@ -83,6 +84,7 @@ void Session::restore(SessionPast past) {
     }
   }
   wake();
+  return true;
 }
 
 SessionStatus Session::status() const {
@@ -175,6 +177,7 @@ bool Session::settle_writing() {
   }
   if (error.empty()) ++entries_;
   then(error);
+  if (snapshot_due()) offer_snapshot();
   return true;
 }
 
@@ -624,7 +627,8 @@ void Session::compute_frame(Clock::time_point due) {
     }
   }
   offer_to_all();
-  offer_snapshot(Clock::now() - begin);
+  work_ += Clock::now() - begin;
+  if (snapshot_due()) offer_snapshot();
 }
 
 void Session::count_frame(std::chrono::duration<double> time) {

@@ -50,7 +50,9 @@ struct SessionStatus {
 struct SessionPast {
   std::vector<LogEntry> log;
   Reach reach;
-  std::optional<SessionSnapshot> snapshot = {};  // not after reach.history_from
+  // At most at reach.history_from, or as early as there is one.
+  std::optional<SessionSnapshot> snapshot = {};
+  std::int64_t first = 0;  // entries that were forgotten before those of `log`
 };
 
 // Hears what an operator should know: repairs and failures, a line each. Called from any thread,
@@ -86,9 +88,10 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Session(SessionIdentity identity, Simulation simulation, const SessionHost& host,
           std::unique_ptr<SessionLog> log);
 
-  // Computes again what there was since the snapshot before any command is carried out, then goes
-  // on as it was. Called at most once, first.
-  void restore(SessionPast past);
+  // Computes again what there was since the snapshot, or since frame 0, before any command is
+  // carried out, then goes on as it was. False, and nothing done, where the log does not reach back
+  // that far. Called at most once, first.
+  [[nodiscard]] bool restore(SessionPast past);
 
   const std::string& id() const { return identity_.id; }
   const std::string& uid() const { return identity_.uid; }
@@ -180,9 +183,10 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Outcome apply(const Acted& acted);
   void let_go_of_streams();
   void compute_frame(Clock::time_point due);
-  void offer_snapshot(std::chrono::duration<double> work);
+  bool snapshot_due() const;
+  void offer_snapshot();
   std::shared_ptr<const SessionSnapshot> snapshot() const;
-  bool begin_at(const SessionSnapshot& from, const std::vector<LogEntry>& log);
+  bool begin_at(const SessionSnapshot& from, const SessionPast& past);
   bool advance_frame();
   void count_frame(std::chrono::duration<double> time);
   std::vector<Repair> take_repairs();
@@ -231,6 +235,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::atomic<int> hands_ = 0;
   const std::chrono::duration<double> snapshot_after_;
   std::chrono::duration<double> work_{};  // since the last snapshot; touched by the slice only
+  std::int64_t entries_in_snapshot_ = 0;  // the last one; touched by the slice only
 
   mutable std::mutex mutex_;  // guards all below
   std::deque<Command> commands_;

@@ -11,21 +11,27 @@
 
 namespace weft {
 
-// Offers the log a snapshot when there was enough to compute since the one before, which large
-// sessions have written more rarely.
-void Session::offer_snapshot(std::chrono::duration<double> work) {
+// Whether there was enough to compute since the last snapshot, which large sessions have written
+// more rarely, or so many calls that the log should not grow without one.
+bool Session::snapshot_due() const {
   constexpr double kParticles = 20'000;
-  work_ += work;
-  if (work_ < snapshot_after_ * std::max(1.0, simulation_.particle_count() / kParticles)) return;
-  std::optional<std::int64_t> history_from;
-  {
-    std::lock_guard lock(mutex_);
-    history_from = reach_.history_from;
-  }
-  if (log_->offer([this] { return snapshot(); }, history_from)) work_ = {};
+  constexpr std::int64_t kManyEntries = 500;
+  return work_ > snapshot_after_ * std::max(1.0, simulation_.particle_count() / kParticles) ||
+         entries_ - entries_in_snapshot_ >= kManyEntries;
 }
 
-// nullptr where it was closed, which ends in it what is to go on after a restart.
+void Session::offer_snapshot() {
+  std::int64_t oldest = 0;
+  {
+    std::lock_guard lock(mutex_);
+    oldest = reach_.history_from.value_or(history_.oldest());
+  }
+  if (!log_->offer([this] { return snapshot(); }, oldest)) return;
+  work_ = {};
+  entries_in_snapshot_ = entries_;
+}
+
+// nullptr where it failed or was closed, which ends in it what is to go on after a restart.
 std::shared_ptr<const SessionSnapshot> Session::snapshot() const {
   auto made = std::make_shared<SessionSnapshot>();
   made->entries = entries_;
@@ -34,7 +40,7 @@ std::shared_ptr<const SessionSnapshot> Session::snapshot() const {
     made->answers.push_back({request, outcome});
   });
   std::lock_guard lock(mutex_);
-  if (closed_) return nullptr;
+  if (closed_ || state_ == SessionState::kFailed) return nullptr;
   if (run_) {
     made->under_way.push_back(
         {latest(), {}, RunBegun{run_->time_scale, run_->until_frame, run_->until_rest}});
@@ -49,19 +55,19 @@ std::shared_ptr<const SessionSnapshot> Session::snapshot() const {
 
 // Begins where it was taken, as far as it belongs to the log; false, and nothing done, where it
 // does not.
-bool Session::begin_at(const SessionSnapshot& from, const std::vector<LogEntry>& log) {
-  const auto entries = static_cast<std::size_t>(from.entries);
-  const bool fits = from.entries >= 0 && entries <= log.size() &&
+bool Session::begin_at(const SessionSnapshot& from, const SessionPast& past) {
+  const auto& log = past.log;
+  const auto entries = static_cast<std::size_t>(from.entries - past.first);
+  const bool fits = from.entries >= past.first && entries <= log.size() &&
                     (entries == log.size() || log[entries].frame >= from.simulation.frame);
   if (!fits || !simulation_.restore(from.simulation)) {
     if (notify_) {
       notify_("session " + identity_.id + ": the snapshot of frame " +
-              std::to_string(from.simulation.frame) +
-              " does not fit its scene and log; it is computed from frame 0 on");
+              std::to_string(from.simulation.frame) + " does not fit its scene and log");
     }
     return false;
   }
-  entries_ = from.entries;
+  entries_ = entries_in_snapshot_ = from.entries;
   for (const auto& [request, outcome] : from.answers) answers_.remember(request, outcome);
   const std::vector<Repair>& repairs = simulation_.repairs();
   std::vector<Repair> of_frame;

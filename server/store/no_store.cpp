@@ -8,10 +8,11 @@ class NoStore final : public SessionStore {
   LeftBehind load() override { return {}; }
   void add(const KeptSession& /*session*/, const Request& /*creation*/) override {}
   std::optional<SessionSnapshot> snapshot(const std::string& /*uid*/,
-                                          const Reach& /*reach*/) override {
+                                          const SessionPast& /*past*/) override {
     return std::nullopt;
   }
-  std::unique_ptr<SessionLog> log_of(const std::string& /*uid*/, std::size_t /*entries*/) override {
+  std::unique_ptr<SessionLog> log_of(const std::string& /*uid*/,
+                                     std::int64_t /*entries*/) override {
     return std::make_unique<NoLog>();
   }
   void erase(const std::string& /*uid*/, const Request& /*deletion*/,

@@ -1,5 +1,6 @@
 #include "server/store/snapshot_files.h"
 
+#include <fcntl.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -26,28 +27,34 @@ namespace fs = std::filesystem;
 constexpr const char* kMagic = "weft snapshot 1\n";  // with the version of the file
 constexpr std::size_t kMagicBytes = 16, kChecksumBytes = 8;
 
-// The frame in the name of a file.
-std::optional<std::int64_t> frame_of(const fs::path& file) {
+fs::path file_of(const fs::path& directory, const SnapshotPlace& place) {
+  return directory / (std::to_string(place.frame) + "-" + std::to_string(place.entries));
+}
+
+// What the name of a file says.
+std::optional<SnapshotPlace> place_of(const fs::path& file) {
   const std::string name = file.filename().string();
-  std::int64_t frame = 0;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), frame);
-  if (error != std::errc() || end != name.data() + name.size()) return std::nullopt;
-  return frame;
+  SnapshotPlace place;
+  const char* end = name.data() + name.size();
+  const auto frame = std::from_chars(name.data(), end, place.frame);
+  if (frame.ec != std::errc() || frame.ptr == end) return std::nullopt;
+  std::from_chars(frame.ptr + 1, end, place.entries);
+  return file_of(file.parent_path(), place) == file ? std::optional(place) : std::nullopt;
+}
+
+SnapshotPlace place_of(const SessionSnapshot& snapshot) {
+  return {snapshot.simulation.frame, snapshot.entries};
 }
 
 // In ascending order.
-std::vector<std::int64_t> frames_in(const fs::path& directory) {
-  std::vector<std::int64_t> frames;
+std::vector<SnapshotPlace> places_in(const fs::path& directory) {
+  std::vector<SnapshotPlace> places;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(directory, error)) {
-    if (const auto frame = frame_of(entry.path())) frames.push_back(*frame);
+    if (const auto place = place_of(entry.path())) places.push_back(*place);
   }
-  std::sort(frames.begin(), frames.end());
-  return frames;
-}
-
-fs::path file_of(const fs::path& directory, std::int64_t frame) {
-  return directory / std::to_string(frame);
+  std::sort(places.begin(), places.end());
+  return places;
 }
 
 void discard(const fs::path& path) {
@@ -67,11 +74,19 @@ std::string checksum_text(const std::string& key, const std::string& record) {
   return text;
 }
 
+// Has the names in the directory reach the disk.
+void sync(const fs::path& directory) {
+  const int descriptor = open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  fsync(descriptor);
+  close(descriptor);
+}
+
 // Writes the file so that it is there whole or not at all; empty, or what was in the way.
 std::string write_whole(const fs::path& path, const std::string& bytes) {
   const fs::path part = path.parent_path() / "part";
   std::error_code error;
-  fs::create_directories(path.parent_path(), error);
+  const bool first = fs::create_directories(path.parent_path(), error);
   const auto close = [](std::FILE* file) { return std::fclose(file); };
   std::unique_ptr<std::FILE, decltype(close)> file(std::fopen(part.c_str(), "wb"), close);
   const bool written = file &&
@@ -84,17 +99,29 @@ std::string write_whole(const fs::path& path, const std::string& bytes) {
     return why;
   }
   fs::rename(part, path, error);
-  return error ? error.message() : "";
+  if (error) return error.message();
+  sync(path.parent_path());
+  if (first) sync(path.parent_path().parent_path());
+  return "";
 }
 
 void keep(const fs::path& directory, const std::string& uid, const SessionSnapshot& snapshot,
-          std::optional<std::int64_t> history_from) try {
-  const fs::path file = file_of(directory, snapshot.simulation.frame);
+          std::int64_t oldest, const SnapshotFiles::Forget& forget) try {
+  constexpr std::int64_t kMostEntries = SnapshotFiles::kMostEntries;
+  const fs::path file = file_of(directory, place_of(snapshot));
   const std::string record = records::encode(uid, snapshot);
   const std::string error = write_whole(file, kMagic + checksum_text(uid, record) + record);
-  if (!error.empty()) spdlog::warn("{} cannot be written: {}", file.string(), error);
-  for (const std::int64_t frame : superfluous(frames_in(directory), history_from))
-    discard(file_of(directory, frame));
+  if (!error.empty()) return spdlog::warn("{} cannot be written: {}", file.string(), error);
+
+  // what readers could find is let go where the log would grow too long for it
+  auto places = places_in(directory);
+  const bool is_long = !places.empty() && snapshot.entries - places.front().entries > kMostEntries;
+  if (is_long) oldest = snapshot.simulation.frame;
+  for (const SnapshotPlace& place : superfluous(places, oldest)) {
+    discard(file_of(directory, place));
+    std::erase(places, place);
+  }
+  if (places.size() > 1 && places[1].frame <= oldest) forget(places.front().entries);
 } catch (const std::exception& error) {  // out of memory
   spdlog::warn("{}: no snapshot: {}", directory.string(), error.what());
 }
@@ -115,8 +142,8 @@ SessionSnapshot read_whole(const fs::path& path, const std::string& uid) {
 
 SnapshotFiles::SnapshotFiles(std::filesystem::path directory) : directory_(std::move(directory)) {}
 
-bool SnapshotFiles::write(const std::string& uid, const SessionLog::Take& take,
-                          std::optional<std::int64_t> history_from) {
+bool SnapshotFiles::write(const std::string& uid, const SessionLog::Take& take, std::int64_t oldest,
+                          const Forget& forget) {
   {
     std::lock_guard lock(mutex_);
     if (!writing_.insert(uid).second) return false;
@@ -126,8 +153,8 @@ bool SnapshotFiles::write(const std::string& uid, const SessionLog::Take& take,
     writing_.erase(uid);
   };
   const auto snapshot = take();
-  const auto work = [directory = directory_ / uid, uid, snapshot, history_from, done] {
-    keep(directory, uid, *snapshot, history_from);
+  const auto work = [directory = directory_ / uid, uid, snapshot, oldest, forget, done] {
+    keep(directory, uid, *snapshot, oldest, forget);
     done();
   };
   const bool posted = snapshot && thread_.post(work);
@@ -136,21 +163,32 @@ bool SnapshotFiles::write(const std::string& uid, const SessionLog::Take& take,
 }
 
 std::optional<SessionSnapshot> SnapshotFiles::read(const std::string& uid,
-                                                   std::optional<std::int64_t> not_after) const {
+                                                   std::optional<std::int64_t> not_after,
+                                                   std::int64_t first) const {
   const fs::path directory = directory_ / uid;
-  auto frames = frames_in(directory);
-  for (; !frames.empty(); frames.pop_back()) {
-    const fs::path file = file_of(directory, frames.back());
-    if (!not_after || frames.back() <= *not_after) try {
-        SessionSnapshot snapshot = read_whole(file, uid);
-        if (snapshot.simulation.frame != frames.back()) throw StoreError("it has another name");
-        return snapshot;
-      } catch (const StoreError& error) {
-        spdlog::warn("{} is damaged, an older one serves: {}", file.string(), error.what());
-      }
-    discard(file);
+  auto places = places_in(directory);
+  std::erase_if(places, [&](const SnapshotPlace& place) { return place.entries < first; });
+  const auto after = std::find_if(places.begin(), places.end(), [&](const SnapshotPlace& place) {
+    return not_after && place.frame > *not_after;
+  });
+  std::reverse(places.begin(), after);
+  if (first == 0) places.erase(after, places.end());
+
+  std::optional<SessionSnapshot> found;
+  for (auto place = places.begin(); !found && place != places.end(); ++place) {
+    const fs::path file = file_of(directory, *place);
+    try {
+      SessionSnapshot snapshot = read_whole(file, uid);
+      if (place_of(snapshot) != *place) throw StoreError("it has another name");
+      found = std::move(snapshot);
+    } catch (const StoreError& error) {
+      spdlog::warn("{} is damaged, another one serves: {}", file.string(), error.what());
+      discard(file);
+    }
   }
-  return std::nullopt;
+  for (const SnapshotPlace& place : places_in(directory))
+    if (!found || place > place_of(*found)) discard(file_of(directory, place));
+  return found;
 }
 
 void SnapshotFiles::erase(const std::string& uid) {
@@ -167,19 +205,19 @@ void SnapshotFiles::keep_only(const std::set<std::string>& uids) {
   }
 }
 
-std::vector<std::int64_t> superfluous(std::vector<std::int64_t> frames,
-                                      std::optional<std::int64_t> history_from) {
-  std::vector<std::int64_t> removed;
+std::vector<SnapshotPlace> superfluous(std::vector<SnapshotPlace> places, std::int64_t oldest) {
+  std::vector<SnapshotPlace> removed;
   const auto take_out = [&](std::size_t i) {
-    removed.push_back(frames[i]);
-    frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(i));
+    removed.push_back(places[i]);
+    places.erase(places.begin() + static_cast<std::ptrdiff_t>(i));
   };
-  while (frames.size() > 2 && (!history_from || frames[1] <= *history_from)) take_out(0);
-  while (frames.size() > SnapshotFiles::kMost) {
+  while (places.size() > 2 && places[2].frame <= oldest) take_out(0);
+  while (places.size() > SnapshotFiles::kMost) {
     // where the least gap is left
-    std::size_t least = 1;
-    for (std::size_t i = 1; i + 2 < frames.size(); ++i)
-      if (frames[i + 1] - frames[i - 1] < frames[least + 1] - frames[least - 1]) least = i;
+    const auto gap = [&](std::size_t i) { return places[i + 1].frame - places[i - 1].frame; };
+    std::size_t least = 2;
+    for (std::size_t i = 2; i + 2 < places.size(); ++i)
+      if (gap(i) < gap(least)) least = i;
     take_out(least);
   }
   return removed;

@@ -22,6 +22,7 @@ namespace {
 constexpr int kApplicationId = 0x57454644;  // "WEFD"
 constexpr int kVersion = 1;                 // user_version of the file
 constexpr int kMostRequests = 10'000;
+constexpr std::int64_t kFewEntries = 256;  // that are not worth forgetting
 constexpr const char* kTables = R"(
   CREATE TABLE session (
     uid TEXT PRIMARY KEY,
@@ -101,11 +102,12 @@ class SqliteStore final : public SessionStore {
   }
 
   LeftBehind load() override;
-  std::optional<SessionSnapshot> snapshot(const std::string& uid, const Reach& reach) override {
-    return snapshots_.read(uid, reach.history_from);
+  std::optional<SessionSnapshot> snapshot(const std::string& uid,
+                                          const SessionPast& past) override {
+    return snapshots_.read(uid, past.reach.history_from, past.first);
   }
   void add(const KeptSession& session, const Request& creation) override;
-  std::unique_ptr<SessionLog> log_of(const std::string& uid, std::size_t entries) override;
+  std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t entries) override;
   void erase(const std::string& uid, const Request& deletion,
              const SessionLog::Written& written) override;
 
@@ -126,13 +128,13 @@ class SqliteStore final : public SessionStore {
   std::string commit(const std::deque<Job>& jobs);
 
   const std::string path_;
-  SnapshotFiles snapshots_{std::filesystem::path(path_).replace_filename("snapshots")};
   SQLite::Database database_;  // used by load(), then by the thread alone
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Job> jobs_;
   bool stopping_ = false;
   std::thread thread_;
+  SnapshotFiles snapshots_{std::filesystem::path(path_).replace_filename("snapshots")};
 };
 
 SQLite::Database SqliteStore::open(const std::string& path) try {
@@ -211,8 +213,12 @@ LeftSession SqliteStore::load_session(const std::string& uid, const std::string&
   SQLite::Statement row(database_,
                         "SELECT number, record, checksum FROM entry WHERE uid = ? ORDER BY number");
   row.bind(1, uid);
-  std::int64_t next = 0;
+  // where the first ones are missing for another reason than that they were forgotten, no snapshot
+  // will fit
+  std::int64_t next = -1;
+  left.past.first = progress.entries;
   for (; row.executeStep(); ++next) {
+    if (next < 0) left.past.first = next = row.getColumn(0).getInt64();
     const std::string entry = blob(row.getColumn(1));
     const bool sound = row.getColumn(0).getInt64() == next &&
                        row.getColumn(2).getInt64() == checksum(entry_key(uid, next), entry);
@@ -221,11 +227,11 @@ LeftSession SqliteStore::load_session(const std::string& uid, const std::string&
                        " of its log is missing, or its checksum is wrong");
     }
     left.past.log.push_back(records::decode_entry(entry));
-    const auto frame = left.past.log.back().frame;
-    const auto before = next == 0 ? 0 : left.past.log[static_cast<std::size_t>(next) - 1].frame;
-    if (frame < before) throw StoreError("its log is out of order");
+    const auto& log = left.past.log;
+    if (log.size() > 1 && log.back().frame < log[log.size() - 2].frame)
+      throw StoreError("its log is out of order");
   }
-  if (next != progress.entries) throw StoreError("its log has lost its end");
+  if (next >= 0 && next != progress.entries) throw StoreError("its log has lost its end");
   return left;
 }
 
@@ -305,8 +311,13 @@ class SqliteStore::Log final : public SessionLog {
         });
   }
 
-  bool offer(const Take& take, std::optional<std::int64_t> history_from) override {
-    return store_.snapshots_.write(uid_, take, history_from);
+  bool offer(const Take& take, std::int64_t oldest) override {
+    const auto forget = [&store = store_, uid = uid_](std::int64_t entries) {
+      store.post(
+          [uid, entries](SQLite::Database& database) { forget_before(database, uid, entries); },
+          [](const std::string&) {});
+    };
+    return store_.snapshots_.write(uid_, take, oldest, forget);
   }
 
  private:
@@ -330,13 +341,25 @@ class SqliteStore::Log final : public SessionLog {
     insert.exec();
   }
 
+  // A short log stays whole: it is enough without any snapshot.
+  static void forget_before(SQLite::Database& database, const std::string& uid,
+                            std::int64_t number) {
+    SQLite::Statement first(database, "SELECT MIN(number) FROM entry WHERE uid = ?");
+    first.bind(1, uid);
+    if (!first.executeStep() || number - first.getColumn(0).getInt64() < kFewEntries) return;
+    SQLite::Statement erase(database, "DELETE FROM entry WHERE uid = ? AND number < ?");
+    erase.bind(1, uid);
+    erase.bind(2, number);
+    erase.exec();
+  }
+
   SqliteStore& store_;
   const std::string uid_;
   const std::shared_ptr<std::int64_t> entries_;  // of the log
 };
 
-std::unique_ptr<SessionLog> SqliteStore::log_of(const std::string& uid, std::size_t entries) {
-  return std::make_unique<Log>(*this, uid, static_cast<std::int64_t>(entries));
+std::unique_ptr<SessionLog> SqliteStore::log_of(const std::string& uid, std::int64_t entries) {
+  return std::make_unique<Log>(*this, uid, entries);
 }
 
 void SqliteStore::post(Work work, SessionLog::Written written) {

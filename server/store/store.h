@@ -59,11 +59,13 @@ class SessionStore {
   virtual void add(const KeptSession& session, const Request& creation) = 0;
 
   // The newest sound snapshot of a session at most at the frame of its reach's history, if there is
-  // one. What is newer is removed.
-  virtual std::optional<SessionSnapshot> snapshot(const std::string& uid, const Reach& reach) = 0;
+  // one; else, where its log does not reach back to frame 0, the oldest sound one after that. What
+  // is newer is removed.
+  virtual std::optional<SessionSnapshot> snapshot(const std::string& uid,
+                                                  const SessionPast& past) = 0;
 
   // Where the session's log goes on after so many entries. The store outlives it.
-  virtual std::unique_ptr<SessionLog> log_of(const std::string& uid, std::size_t entries) = 0;
+  virtual std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t entries) = 0;
 
   // Forgets a session, if it is there; `written` as in SessionLog.
   virtual void erase(const std::string& uid, const Request& deletion,

@@ -1,7 +1,10 @@
+#include "server/store/store.h"
+
 #include <spdlog/spdlog.h>
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -27,6 +30,7 @@ class Restart : public ::testing::Test {
     ServerOptions options = Service::in_process();
     options.data_dir = directory_.name();
     options.snapshot_ms = snapshot_ms_;
+    options.limits.history_bytes_per_session = history_bytes_;
     service_ = std::make_unique<Service>(options);
   }
   void restart() {
@@ -64,6 +68,7 @@ class Restart : public ::testing::Test {
   }
   const TemporaryDirectory directory_;
   int snapshot_ms_ = 2000;
+  std::int64_t history_bytes_ = 64 << 20;
   std::unique_ptr<Service> service_;
 };
 
@@ -350,15 +355,32 @@ class RestartWithSnapshots : public Restart {
   std::filesystem::path snapshots_of(const v1::Session& session) const {
     return std::filesystem::path(directory_.path("snapshots")) / session.uid();
   }
+  // In the order in which they were taken.
+  std::vector<std::filesystem::path> files_of(const v1::Session& session) const {
+    std::vector<std::filesystem::path> files;
+    for (const auto& file : std::filesystem::directory_iterator(snapshots_of(session)))
+      if (std::isdigit(file.path().filename().string().front()) != 0) files.push_back(file.path());
+    std::sort(files.begin(), files.end(),
+              [](const auto& a, const auto& b) { return frame_of(a) < frame_of(b); });
+    return files;
+  }
+  static std::int64_t frame_of(const std::filesystem::path& file) {
+    return std::stoll(file.filename().string());
+  }
+  std::int64_t last_of(const v1::Session& session) const {
+    if (!std::filesystem::exists(snapshots_of(session))) return -1;
+    const auto files = files_of(session);
+    return files.empty() ? -1 : frame_of(files.back());
+  }
   // Steps until there is a snapshot of the newest frame. One is left out while the one before it is
   // written.
   std::int64_t kept(const v1::Session& session) {
     for (;;) {
+      const std::int64_t before = last_of(session);
       const std::int64_t frame = service_->step(session).frame();
-      for (int look = 0; look < 1000; ++look) {
-        if (std::filesystem::exists(snapshots_of(session) / std::to_string(frame))) return frame;
+      for (int look = 0; look < 10'000 && last_of(session) == before; ++look)
         std::this_thread::yield();
-      }
+      if (last_of(session) == frame) return frame;
     }
   }
 };
@@ -384,14 +406,11 @@ TEST_F(RestartWithSnapshots, ComputesOnlyWhatCameAfterTheLast) {
   expect_equal(found, wanted);
 }
 
-TEST_F(RestartWithSnapshots, KeepsTwoOfThemAndNoneOfASessionThatIsGone) {
+TEST_F(RestartWithSnapshots, KeepsSomeOfThemAndNoneOfASessionThatIsGone) {
   const v1::Session session = service_->create(), other = service_->create();
-  for (int i = 0; i < 5; ++i) kept(session);
+  for (int i = 0; i < 10; ++i) kept(session);
   kept(other);
-  const auto count = [&] {
-    return std::distance(std::filesystem::directory_iterator(snapshots_of(session)), {});
-  };
-  while (count() != 2) std::this_thread::yield();
+  while (files_of(session).size() != SnapshotFiles::kMost) std::this_thread::yield();
   service_->erase(other);
   while (std::filesystem::exists(snapshots_of(other))) std::this_thread::yield();
 }
@@ -403,19 +422,16 @@ TEST_F(RestartWithSnapshots, NeverMistakesADamagedOneForASound) {
   const std::int64_t newest = kept(session);
   const std::string before = service_->get(session).SerializeAsString();
   service_.reset();
-  std::int64_t older = newest;
-  for (const auto& file : std::filesystem::directory_iterator(snapshots_of(session)))
-    older = std::min<std::int64_t>(older, std::stoll(file.path().filename().string()));
+  const auto kept_files = files_of(session);
+  const auto& file = kept_files.back();
+  const std::int64_t older = frame_of(kept_files[kept_files.size() - 2]);
   ASSERT_LT(older, newest);
-  const auto path = [&](std::int64_t frame) {
-    return snapshots_of(session) / std::to_string(frame);
-  };
-  const std::string good = content(path(newest));
+  const std::string good = content(file);
   spdlog::set_level(spdlog::level::off);
   const SnapshotFiles files(directory_.path("snapshots"));
   const auto frame_with = [&](const std::string& bytes) {
-    std::ofstream(path(newest), std::ios::binary) << bytes;
-    return files.read(session.uid(), std::nullopt)->simulation.frame;
+    std::ofstream(file, std::ios::binary) << bytes;
+    return files.read(session.uid(), std::nullopt, 0)->simulation.frame;
   };
   EXPECT_EQ(frame_with(good), newest);
   for (std::size_t place = 0; place < good.size(); place += 3) {
@@ -427,17 +443,115 @@ TEST_F(RestartWithSnapshots, NeverMistakesADamagedOneForASound) {
     ASSERT_EQ(frame_with(good.substr(0, size)), older) << size << " bytes";
   spdlog::set_level(spdlog::level::info);
 
-  std::ofstream(path(newest), std::ios::binary) << good.substr(0, 100);
+  std::ofstream(file, std::ios::binary) << good.substr(0, 100);
   start();
   service_->pause(session);
   EXPECT_EQ(computed(), newest - older);
   EXPECT_EQ(service_->get(session).SerializeAsString(), before);
   service_.reset();
-  for (const auto& file : std::filesystem::directory_iterator(snapshots_of(session)))
-    std::ofstream(file.path(), std::ios::binary) << "damaged";
+  for (const auto& each : files_of(session)) std::ofstream(each, std::ios::binary) << "damaged";
   start();
   service_->pause(session);
   EXPECT_EQ(computed(), newest);
+  EXPECT_EQ(service_->get(session).SerializeAsString(), before);
+}
+
+// A server that keeps few frames, so that little of a session has to be computed again.
+class RestartWithLongLogs : public RestartWithSnapshots {
+ protected:
+  RestartWithLongLogs() {
+    history_bytes_ = 20'000;  // some 12 frames
+    restart();
+  }
+
+  // The log of the only session, when its server is gone.
+  SessionPast past() {
+    service_.reset();
+    auto left = open_sqlite_store(directory_.name())->load();
+    EXPECT_THAT(left.sessions, SizeIs(1));
+    return std::move(left.sessions.at(0).past);
+  }
+  // Adds 1200 entries to the log.
+  void change_and_step(const v1::Session& session) {
+    v1::UpdateTextileRequest request;
+    request.set_name(session.name());
+    request.mutable_update_mask()->add_paths("raw.bend_n_m2");
+    for (int i = 0; i < 600; ++i) {
+      request.mutable_textile()->mutable_raw()->set_bend_n_m2(1e-6 * (1 + i % 7));
+      ASSERT_EQ(service_->error(&Sessions::UpdateTextile, request).code, grpc::StatusCode::OK);
+      service_->step(session);
+    }
+  }
+  std::string newest(const v1::Session& session) {
+    const std::int64_t frame = service_->get(session).frame();
+    return Stream(*service_, frames_of(session, frame, frame)).rest().at(0).SerializeAsString();
+  }
+};
+
+TEST_F(RestartWithLongLogs, ForgetsWhatLiesBeforeTheOlderSnapshotsButNoAnswer) {
+  const v1::Session session = service_->create();
+  v1::StepSessionRequest named;
+  named.set_name(session.name());
+  named.set_request_id("first");
+  v1::StepSessionResponse first, again;
+  ASSERT_TRUE(service_->call(&Sessions::StepSession, named, &first).ok());
+  change_and_step(session);
+  kept(session);
+  const std::string before = newest(session);
+  const SessionPast left = past();
+  EXPECT_GT(left.first, 0);
+  EXPECT_LT(left.log.size(), 400);
+  EXPECT_GT(left.first + static_cast<std::int64_t>(left.log.size()), 1200);
+
+  start();
+  service_->pause(session);
+  EXPECT_LT(computed(), 100);
+  EXPECT_EQ(newest(session), before);
+  ASSERT_TRUE(service_->call(&Sessions::StepSession, named, &again).ok());
+  EXPECT_EQ(again.SerializeAsString(), first.SerializeAsString());
+
+  // the newest is damaged: the log reaches back to the one before
+  service_.reset();
+  std::ofstream(files_of(session).back(), std::ios::binary) << "damaged";
+  start();
+  service_->pause(session);
+  EXPECT_EQ(newest(session), before);
+  service_.reset();
+  for (const auto& file : files_of(session)) std::ofstream(file, std::ios::binary) << "damaged";
+  start();
+  v1::GetSessionRequest get;
+  get.set_name(session.name());
+  EXPECT_EQ(service_->error(&Sessions::GetSession, get).reason(), "SESSION_DAMAGED");
+}
+
+TEST_F(RestartWithLongLogs, GivesTheFramesOfAServerThatWasLeftAlone) {
+  const v1::Session session = service_->create();
+  change_and_step(session);
+  restart();
+  change_and_step(session);
+  const std::string after = newest(session);
+  EXPECT_GT(past().first, 1000);
+  start();
+  service_->erase(session);
+  history_bytes_ = 64 << 20;
+  snapshot_ms_ = 3'600'000;
+  restart();
+  const v1::Session undisturbed = service_->create();
+  change_and_step(undisturbed);
+  change_and_step(undisturbed);
+  EXPECT_EQ(newest(undisturbed), after);
+}
+
+TEST_F(RestartWithLongLogs, ForgetsCallsOfASessionThatStandsStill) {
+  const v1::Session session = service_->create();
+  for (int i = 0; i < 2100; ++i) service_->pause(session);
+  set_preset(session, "denim_11oz");
+  const std::string before = service_->get(session).SerializeAsString();
+  const SessionPast left = past();
+  EXPECT_LE(left.log.size(), 1100);
+  EXPECT_EQ(left.first + static_cast<std::int64_t>(left.log.size()), 2101);
+  start();
+  service_->pause(session);
   EXPECT_EQ(service_->get(session).SerializeAsString(), before);
 }
 
@@ -455,20 +569,23 @@ TEST_F(RestartWithSnapshots, GoesOnWhereTheyCannotBeWritten) {
 }
 
 TEST(Snapshots, AreKeptWhereARestartNeedsThem) {
-  std::vector<std::int64_t> kept;
+  std::vector<SnapshotPlace> kept;
+  const auto discard = [&](std::int64_t oldest) {
+    for (const SnapshotPlace& gone : superfluous(kept, oldest)) std::erase(kept, gone);
+  };
   for (std::int64_t frame = 10; frame <= 1000; frame += 10) {
-    kept.push_back(frame);
+    kept.push_back({frame, 1});
     const std::int64_t oldest = std::max<std::int64_t>(0, frame - 300);
-    for (const std::int64_t gone : superfluous(kept, oldest)) std::erase(kept, gone);
+    discard(oldest);
     EXPECT_LE(kept.size(), SnapshotFiles::kMost);
-    EXPECT_EQ(kept.back(), frame);
+    EXPECT_EQ(kept.back().frame, frame);
     if (frame == 10) continue;
-    EXPECT_EQ(kept[kept.size() - 2], frame - 10);
-    EXPECT_LE(kept.front(), std::max<std::int64_t>(oldest, 10));
-    EXPECT_GE(kept.front(), oldest - 200);
+    EXPECT_EQ(kept[kept.size() - 2].frame, frame - 10);
+    EXPECT_LE(kept[1].frame, std::max<std::int64_t>(oldest, 20));
+    EXPECT_GE(kept[0].frame, oldest - 400);
   }
-  for (const std::int64_t gone : superfluous(kept, std::nullopt)) std::erase(kept, gone);
-  EXPECT_EQ(kept, (std::vector<std::int64_t>{990, 1000}));
+  discard(1000);
+  EXPECT_EQ(kept, (std::vector<SnapshotPlace>{{990, 1}, {1000, 1}}));
 }
 
 }  // namespace

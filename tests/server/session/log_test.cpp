@@ -72,7 +72,7 @@ class DiskLog : public SessionLog {
     written(error);
   }
 
-  bool offer(const Take& take, std::optional<std::int64_t> /*history_from*/) override {
+  bool offer(const Take& take, std::int64_t /*oldest*/) override {
     if (disk_->before_snapshot) disk_->before_snapshot();
     const auto snapshot = take();
     std::lock_guard lock(disk_->mutex);
@@ -103,7 +103,7 @@ class SessionLogTest : public ::testing::Test {
   // The session that another process would have.
   std::shared_ptr<Session> restored(const SessionPast& past) {
     const auto session = make(std::make_shared<Disk>());
-    session->restore(past);
+    EXPECT_TRUE(session->restore(past));
     return session;
   }
   std::shared_ptr<Session> restored_and_paused(const SessionPast& past) {
@@ -312,6 +312,31 @@ TEST_F(SessionLogTest, GivesTheSameFramesAndAnswersFromEverySnapshot) {
     EXPECT_EQ(same.plan->step.estimated_bound, changed.plan->step.estimated_bound);
     EXPECT_EQ(Answer(*again, to_goal).applied().frame, ran.frame);
   }
+}
+
+TEST_F(SessionLogTest, TakesASnapshotAfterManyCalls) {
+  const auto session = make(disk_);
+  for (int i = 0; i < 499; ++i) pause(*session).applied();
+  EXPECT_EQ(disk_->offers, 0);
+  pause(*session).applied();
+  pause(*session).applied();  // after it
+  ASSERT_EQ(disk_->offers, 1);
+  EXPECT_EQ(disk_->past().snapshot->entries, 500);
+}
+
+TEST_F(SessionLogTest, NeedsASnapshotWhereItsBeginningWasForgotten) {
+  const auto session = make_kept(disk_);
+  step(*session, 20).applied();
+  Answer(*session, bend(3e-5)).applied();
+  step(*session, 10).applied();
+  SessionPast past = disk_->past();
+  past.log.erase(past.log.begin(), past.log.begin() + 2);
+  past.first = 2;
+  expect_equal(*restored_and_paused(past), *session);
+  past.snapshot->entries = 1;
+  EXPECT_FALSE(make(std::make_shared<Disk>())->restore(past));
+  past.snapshot.reset();
+  EXPECT_FALSE(make(std::make_shared<Disk>())->restore(past));
 }
 
 TEST_F(SessionLogTest, WithASnapshotGivesReadersTheFramesThatTheyHad) {

@@ -45,6 +45,8 @@ std::vector<Number> numbers(Config& config) {
       {"max_streams", &limits.max_streams, 1, 100'000, "Streams at a time"},
       {"max_streams_per_principal", &limits.max_streams_per_principal, 1, 100'000,
        "Streams of one principal at a time"},
+      {"max_snapshots_per_session", &limits.max_snapshots_per_session, 1, 1000,
+       "Snapshots on demand of one session"},
       {"max_tests", &limits.max_tests, 1, 256, "Tests of textiles at a time"},
       {"history_bytes", &limits.history_bytes_per_session, kMiB, 1024 * kMiB * 64,
        "Bytes of frames that a session keeps for its streams"},

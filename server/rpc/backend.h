@@ -40,8 +40,12 @@ struct Backend {
         registry(given) {}
 
   SessionHost host() {
-    return {scheduler, stats, static_cast<std::size_t>(limits.history_bytes_per_session),
-            [](const std::string& line) { spdlog::warn(line); }, snapshot_after};
+    return {scheduler,
+            stats,
+            static_cast<std::size_t>(limits.history_bytes_per_session),
+            [](const std::string& line) { spdlog::warn(line); },
+            snapshot_after,
+            static_cast<std::size_t>(limits.max_snapshots_per_session)};
   }
 
   // The caller of a stream, or why there is none.

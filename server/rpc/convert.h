@@ -2,7 +2,9 @@
 
 #include <google/protobuf/field_mask.pb.h>
 #include <google/protobuf/repeated_ptr_field.h>
+#include <google/protobuf/timestamp.pb.h>
 
+#include <chrono>
 #include <string>
 #include <variant>
 #include <vector>
@@ -40,11 +42,14 @@ enum class StartValues { kIncluded, kLeftOut };
 
 // With every default filled in.
 v1::Session to_proto(const Session& session, StartValues start_values = StartValues::kIncluded);
+v1::Snapshot to_proto(const Session& session, const NamedSnapshot& snapshot);
 v1::Textile to_proto(const Textile& textile);
 
 // As it was given: a clamp that follows from the stretch stays absent.
 v1::Textile as_given(const Textile& textile);
 v1::Scene as_given(const Scene& scene);
+
+google::protobuf::Timestamp timestamp_of(std::chrono::system_clock::time_point time);
 
 Pin to_pin(const v1::Pin& pin);
 v1::Pin to_proto(const Pin& pin);

@@ -165,6 +165,11 @@ void set(v1::Scene* to, const Scene& from, const std::vector<Textile>& textiles,
 
 }  // namespace
 
+google::protobuf::Timestamp timestamp_of(std::chrono::system_clock::time_point time) {
+  return google::protobuf::util::TimeUtil::NanosecondsToTimestamp(
+      std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count());
+}
+
 v1::Session to_proto(const Session& session, StartValues start_values) {
   const SessionStatus status = session.status();
   v1::Session result;
@@ -181,9 +186,19 @@ v1::Session to_proto(const Session& session, StartValues start_values) {
   result.set_numerics_id(session.numerics_id());
   result.set_owner(session.owner());
   for (const auto& repair : status.repairs) *result.add_repairs() = to_proto(repair);
-  const auto since_epoch = session.create_time().time_since_epoch();
-  *result.mutable_create_time() = google::protobuf::util::TimeUtil::NanosecondsToTimestamp(
-      std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count());
+  *result.mutable_create_time() = timestamp_of(session.create_time());
+  return result;
+}
+
+v1::Snapshot to_proto(const Session& session, const NamedSnapshot& snapshot) {
+  v1::Snapshot result;
+  result.set_name(snapshot_name(session.id(), snapshot.id));
+  result.set_frame(snapshot.frame);
+  result.set_time_s(static_cast<double>(snapshot.frame) * session.scene().solver.frame_step);
+  *result.mutable_create_time() = timestamp_of(snapshot.create_time);
+  result.set_size_bytes(snapshot.bytes);
+  result.set_numerics_id(snapshot.numerics_id);
+  result.set_damage(snapshot.damage);
   return result;
 }
 

@@ -56,9 +56,8 @@ grpc::Status refused(const Registry::Refused& refused, const Caller& caller,
 // A call whose scene is being planned; answered once, by the planner or by a server that goes down.
 class SessionService::Creation {
  public:
-  Creation(Caller who, const v1::CreateSessionRequest& asked, v1::Session* response,
-           grpc::ServerUnaryReactor* reactor)
-      : caller(std::move(who)), request(asked), response_(response), reactor_(reactor) {}
+  Creation(v1::Session* response, grpc::ServerUnaryReactor* reactor)
+      : response_(response), reactor_(reactor) {}
 
   void answer(const grpc::Status& status, v1::Session session = {}) {
     std::lock_guard lock(mutex_);
@@ -67,24 +66,17 @@ class SessionService::Creation {
     std::exchange(reactor_, nullptr)->Finish(status);
   }
 
-  const Caller caller;
-  const v1::CreateSessionRequest request;  // a copy: it may outlive the call
-
  private:
   std::mutex mutex_;
   v1::Session* response_;
   grpc::ServerUnaryReactor* reactor_;  // null: answered
 };
 
-grpc::Status SessionService::begin(const std::shared_ptr<Creation>& creation) {
-  // what a full server refuses does not wait for the plans of others
-  const auto& request = creation->request;
-  if (auto status = refusal(creation->caller, request, request.session_id()); !status.ok())
-    return status;
+// False where the server goes down.
+bool SessionService::begin(const std::shared_ptr<Creation>& creation) {
   std::lock_guard lock(mutex_);
-  if (backend_.draining) return errors::server_draining();
-  creations_.insert(creation);
-  return grpc::Status::OK;
+  if (!backend_.draining) creations_.insert(creation);
+  return !backend_.draining;
 }
 
 void SessionService::end(const std::shared_ptr<Creation>& creation) {
@@ -98,27 +90,45 @@ void SessionService::drain() {
   for (const auto& creation : creations_) creation->answer(errors::server_draining());
 }
 
-// Planning a scene takes its time: not on a thread of gRPC's.
 grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
                                                         const v1::CreateSessionRequest* request,
                                                         v1::Session* response) {
-  auto* reactor = new UnaryCall(backend_.calls);
   const auto caller = backend_.access.caller(*context);
-  if (const auto* error = std::get_if<grpc::Status>(&caller)) {
-    reactor->Finish(*error);
-    return reactor;
-  }
-  const auto creation =
-      std::make_shared<Creation>(std::get<Caller>(caller), *request, response, reactor);
-  if (const auto status = begin(creation); !status.ok()) {
+  if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
+  const auto& who = std::get<Caller>(caller);
+  // what a full server refuses does not wait for the plans of others
+  return create_later(refusal(who, *request, request->session_id()), response,
+                      [this, who, request = *request](v1::Session& session) {
+                        return create(who, request, session);
+                      });
+}
+
+grpc::ServerUnaryReactor* SessionService::RestoreSession(grpc::CallbackServerContext* context,
+                                                         const v1::RestoreSessionRequest* request,
+                                                         v1::Session* response) {
+  const auto caller = backend_.access.caller(*context);
+  if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
+  return create_later(grpc::Status::OK, response,
+                      [this, who = std::get<Caller>(caller), request = *request](
+                          v1::Session& session) { return restore(who, request, session); });
+}
+
+// Planning a scene takes its time: not on a thread of gRPC's. `make` has copies of what it needs:
+// it may outlive the call.
+grpc::ServerUnaryReactor* SessionService::create_later(grpc::Status status, v1::Session* response,
+                                                       Make make) {
+  auto* reactor = new UnaryCall(backend_.calls);
+  const auto creation = std::make_shared<Creation>(response, reactor);
+  if (status.ok() && !begin(creation)) status = errors::server_draining();
+  if (!status.ok()) {
     creation->answer(status);
     return reactor;
   }
-  const bool posted = backend_.planner.post([this, creation] {
+  const bool posted = backend_.planner.post([this, creation, make = std::move(make)] {
     try {
       v1::Session session;
-      const grpc::Status status = create(creation->caller, creation->request, session);
-      creation->answer(status, std::move(session));
+      const grpc::Status made = make(session);
+      creation->answer(made, std::move(session));
     } catch (const std::bad_alloc&) {
       creation->answer(
           errors::exhausted("memory", "the server has no memory for this scene", true));
@@ -148,11 +158,7 @@ grpc::Status SessionService::refusal(const Caller& caller, const v1::CreateSessi
 
 grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessionRequest& request,
                                     v1::Session& response) {
-  if (!request.session_id().empty() && !is_session_id(request.session_id())) {
-    return errors::field_invalid("session_id", "\"" + request.session_id() +
-                                                   "\" is not 1 to 63 characters of a-z, 0-9 and "
-                                                   "-, beginning with a letter");
-  }
+  if (const auto error = refusal_of_id("session_id", request.session_id())) return *error;
   if (!request.session().has_scene()) {
     return errors::field_invalid("session.scene", "is absent");
   }
@@ -198,15 +204,80 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
     return grpc::Status::OK;
   }
   try {
-    backend_.store->add({identity, session->scene()}, name);
+    backend_.store->add({identity, session->scene()}, name, nullptr);
   } catch (const StoreError& error) {
     return errors::store_unwritable(error.what());
   }
+  return enroll(session, caller, name);
+}
+
+// Adds a session that the store has.
+grpc::Status SessionService::enroll(const std::shared_ptr<Session>& session, const Caller& caller,
+                                    const Request& name) {
   if (const auto reason = backend_.registry.add(session)) {
-    backend_.store->erase(identity.uid, {}, [](const std::string&) {});
-    return refused(*reason, caller, id);
+    backend_.store->erase(session->uid(), {}, [](const std::string&) {});
+    return refused(*reason, caller, session->id());
   }
   backend_.requests.remember(name, session->uid());
+  return grpc::Status::OK;
+}
+
+grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSessionRequest& request,
+                                     v1::Session& response) {
+  if (const auto error = refusal_of_id("session_id", request.session_id())) return *error;
+  const auto parts = read_snapshot_name(request.name());
+  if (!parts) {
+    return errors::field_invalid(
+        "name", "\"" + request.name() + "\" is not sessions/{session}/snapshots/{snapshot}");
+  }
+  const auto named = named_request(caller, request, request.request_id());
+  if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
+  const Request& name = std::get<Request>(named);
+  const auto known = backend_.requests.find(name);
+  if (const auto* error = std::get_if<grpc::Status>(&known)) return *error;
+  if (const auto& uid = std::get<std::optional<std::string>>(known))
+    return created_before(*uid, response);
+
+  const auto found = find_session(backend_.registry, caller, parts->session);
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
+  const Session& source = *std::get<std::shared_ptr<Session>>(found);
+  const auto snapshots = source.snapshots();
+  const bool there = std::any_of(snapshots.begin(), snapshots.end(),
+                                 [&](const NamedSnapshot& each) { return each.id == parts->id; });
+  if (!there) return errors::snapshot_not_found(request.name());
+  const std::string id = request.session_id().empty() ? make_session_id() : request.session_id();
+  if (const auto reason = backend_.registry.refusal(id, caller.principal, source.particle_count()))
+    return refused(*reason, caller, id);
+
+  // all that came before it is one entry of a log that is forgotten, see SessionStore::add()
+  SessionPast past;
+  past.first = 1;
+  try {
+    past.snapshot = backend_.store->named_snapshot(source.uid(), parts->id);
+  } catch (const StoreError& error) {
+    return errors::snapshot_damaged(request.name(), error.what());
+  }
+  SessionSnapshot& snapshot = *past.snapshot;
+  snapshot.entries = past.first;
+  snapshot.under_way.clear();
+  snapshot.answers.clear();
+  past.reach.frame = snapshot.simulation.frame;
+
+  const SessionIdentity identity = make_identity(id, numerics_id(), caller.principal);
+  const auto session =
+      std::make_shared<Session>(identity, Simulation(source.scene()), backend_.host(),
+                                backend_.store->log_of(identity.uid, past.first));
+  try {
+    backend_.store->add({identity, source.scene()}, name, &snapshot);
+  } catch (const StoreError& error) {
+    return errors::store_unwritable(error.what());
+  }
+  if (!session->restore(std::move(past))) {
+    backend_.store->erase(identity.uid, {}, [](const std::string&) {});
+    return errors::snapshot_damaged(request.name(), "it does not fit the scene of its session");
+  }
+  if (auto status = enroll(session, caller, name); !status.ok()) return status;
+  response = to_proto(*session);
   return grpc::Status::OK;
 }
 

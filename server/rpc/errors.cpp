@@ -147,6 +147,26 @@ grpc::Status session_damaged(const std::string& name, const std::string& why) {
   return to_grpc(status);
 }
 
+grpc::Status snapshot_not_found(const std::string& name) {
+  auto status = make(grpc::StatusCode::NOT_FOUND, "SNAPSHOT_NOT_FOUND",
+                     "there is no snapshot " + name + "; ListSnapshots names them all");
+  add_resource(status, "Snapshot", name);
+  return to_grpc(status);
+}
+
+grpc::Status snapshot_exists(const std::string& name) {
+  auto status =
+      make(grpc::StatusCode::ALREADY_EXISTS, "SNAPSHOT_EXISTS", "there is a snapshot " + name);
+  add_resource(status, "Snapshot", name);
+  return to_grpc(status);
+}
+
+grpc::Status snapshot_damaged(const std::string& name, const std::string& why) {
+  auto status = make(grpc::StatusCode::DATA_LOSS, "SNAPSHOT_DAMAGED", name + " is damaged: " + why);
+  add_resource(status, "Snapshot", name);
+  return to_grpc(status);
+}
+
 grpc::Status textile_not_found(const std::string& name) {
   auto status = make(grpc::StatusCode::NOT_FOUND, "TEXTILE_NOT_FOUND",
                      "there is no textile " + name + "; ListTextiles names them all");

@@ -33,6 +33,9 @@ grpc::Status session_not_found(const std::string& name);
 grpc::Status session_not_yours(const std::string& name);
 grpc::Status session_exists(const std::string& name);
 grpc::Status session_damaged(const std::string& name, const std::string& why);
+grpc::Status snapshot_not_found(const std::string& name);
+grpc::Status snapshot_exists(const std::string& name);
+grpc::Status snapshot_damaged(const std::string& name, const std::string& why);
 grpc::Status textile_not_found(const std::string& name);
 
 grpc::Status failed_precondition(const std::string& reason, const std::string& message,

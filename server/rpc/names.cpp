@@ -8,7 +8,7 @@
 namespace weft {
 namespace {
 
-constexpr std::string_view kCollection = "sessions/";
+constexpr std::string_view kCollection = "sessions/", kSnapshots = "/snapshots/";
 
 }  // namespace
 
@@ -23,6 +23,25 @@ bool is_session_id(const std::string& id) {
   return !id.empty() && id.size() <= 63 && letter(id.front()) &&
          std::all_of(id.begin(), id.end(),
                      [&](char c) { return letter(c) || (c >= '0' && c <= '9') || c == '-'; });
+}
+
+std::optional<grpc::Status> refusal_of_id(const std::string& field, const std::string& id) {
+  if (id.empty() || is_session_id(id)) return std::nullopt;
+  return errors::field_invalid(field, "\"" + id +
+                                          "\" is not 1 to 63 characters of a-z, 0-9 and -, "
+                                          "beginning with a letter");
+}
+
+std::string snapshot_name(const std::string& session_id, const std::string& id) {
+  return session_name(session_id) + std::string(kSnapshots) + id;
+}
+
+std::optional<SnapshotName> read_snapshot_name(const std::string& name) {
+  const std::size_t at = name.find(kSnapshots);
+  if (at == std::string::npos) return std::nullopt;
+  SnapshotName parts{name.substr(0, at), name.substr(at + kSnapshots.size())};
+  if (!is_session_id(id_of(parts.session)) || !is_session_id(parts.id)) return std::nullopt;
+  return parts;
 }
 
 std::string make_session_id() {

@@ -3,13 +3,14 @@
 #include <grpcpp/support/status.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 
 #include "server/rpc/access.h"
 #include "server/session/registry.h"
 
-// Resource names: "sessions/{session}".
+// Resource names: "sessions/{session}", "sessions/{session}/snapshots/{snapshot}".
 namespace weft {
 
 std::string session_name(const std::string& id);
@@ -17,8 +18,20 @@ std::string session_name(const std::string& id);
 // The id in such a name; empty where it is none.
 std::string id_of(const std::string& name);
 
-// 1 to 63 characters of [a-z0-9-], beginning with a letter.
+// 1 to 63 characters of [a-z0-9-], beginning with a letter; of snapshots, too.
 bool is_session_id(const std::string& id);
+// What is wrong with an id that a caller gave; empty: the server picks one.
+std::optional<grpc::Status> refusal_of_id(const std::string& field, const std::string& id);
+
+std::string snapshot_name(const std::string& session_id, const std::string& id);
+
+// The parts of a snapshot's name.
+struct SnapshotName {
+  std::string session;  // "sessions/{session}"
+  std::string id;
+};
+// nullopt where the name is none.
+std::optional<SnapshotName> read_snapshot_name(const std::string& name);
 
 // An id that nobody will guess to be taken.
 std::string make_session_id();

@@ -22,10 +22,10 @@ struct Asked {
 // Who calls, and his session of that name, or what is wrong with either.
 std::variant<Asked, grpc::Status> find(const Backend& backend,
                                        const grpc::CallbackServerContext& context,
-                                       const std::string& name) {
+                                       const std::string& name, const std::string& field = "name") {
   const auto caller = backend.access.caller(context);
   if (const auto* error = std::get_if<grpc::Status>(&caller)) return *error;
-  const auto found = find_session(backend.registry, std::get<Caller>(caller), name);
+  const auto found = find_session(backend.registry, std::get<Caller>(caller), name, field);
   if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
   return Asked{std::get<Caller>(caller), std::get<std::shared_ptr<Session>>(found)};
 }
@@ -101,6 +101,13 @@ grpc::Status to_status(const Refusal& refusal, const Session& session) {
       return errors::request_used();
     case Refusal::Why::kNotKept:
       return errors::store_unwritable(refusal.text);
+    case Refusal::Why::kSnapshotExists:
+      return errors::snapshot_exists(snapshot_name(session.id(), refusal.text));
+    case Refusal::Why::kTooManySnapshots:
+      return errors::exhausted("snapshots_per_session",
+                               name + " has as many snapshots as it may have: " +
+                                   std::to_string(session.snapshots().size()),
+                               false);
     case Refusal::Why::kUnstable:
       break;
   }
@@ -325,6 +332,34 @@ grpc::ServerUnaryReactor* SessionService::PauseSession(grpc::CallbackServerConte
   if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
   return submit(backend_.calls, context, *request, std::get<Asked>(found), PauseCommand{},
                 [response](const Applied& applied) { response->set_applied_frame(applied.frame); });
+}
+
+grpc::ServerUnaryReactor* SessionService::CreateSnapshot(grpc::CallbackServerContext* context,
+                                                         const v1::CreateSnapshotRequest* request,
+                                                         v1::Snapshot* response) {
+  const auto found = find(backend_, *context, request->parent(), "parent");
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
+  const std::string& id = request->snapshot_id();
+  if (const auto error = refusal_of_id("snapshot_id", id)) return answer(context, *error);
+  const auto fill = [id, response,
+                     session = std::get<Asked>(found).session](const Applied& applied) {
+    const std::string made = id.empty() ? default_snapshot_id(applied.newest) : id;
+    for (const NamedSnapshot& snapshot : session->snapshots())
+      if (snapshot.id == made) *response = to_proto(*session, snapshot);
+  };
+  return submit(backend_.calls, context, *request, std::get<Asked>(found), KeepSnapshot{id, {}, {}},
+                fill);
+}
+
+grpc::ServerUnaryReactor* SessionService::ListSnapshots(grpc::CallbackServerContext* context,
+                                                        const v1::ListSnapshotsRequest* request,
+                                                        v1::ListSnapshotsResponse* response) {
+  const auto found = find(backend_, *context, request->parent(), "parent");
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return answer(context, *error);
+  const auto& session = std::get<Asked>(found).session;
+  for (const NamedSnapshot& snapshot : session->snapshots())
+    *response->add_snapshots() = to_proto(*session, snapshot);
+  return answer(context, grpc::Status::OK);
 }
 
 }  // namespace weft

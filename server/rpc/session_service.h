@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -21,8 +22,11 @@ using SessionMethods = v1::SessionService::WithCallbackMethod_CreateSession<
                         v1::SessionService::WithCallbackMethod_RunSession<
                             v1::SessionService::WithCallbackMethod_PauseSession<
                                 v1::SessionService::WithCallbackMethod_ApplyActions<
-                                    v1::SessionService::WithRawCallbackMethod_Interact<
-                                        v1::SessionService::Service>>>>>>>>>>;
+                                    v1::SessionService::WithCallbackMethod_CreateSnapshot<
+                                        v1::SessionService::WithCallbackMethod_ListSnapshots<
+                                            v1::SessionService::WithCallbackMethod_RestoreSession<
+                                                v1::SessionService::WithRawCallbackMethod_Interact<
+                                                    v1::SessionService::Service>>>>>>>>>>>>>;
 
 // Why a session did not carry a command out.
 grpc::Status to_status(const Refusal& refusal, const Session& session);
@@ -62,17 +66,33 @@ class SessionService final : public SessionMethods {
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Interact(
       grpc::CallbackServerContext* context) override;
 
+  grpc::ServerUnaryReactor* CreateSnapshot(grpc::CallbackServerContext* context,
+                                           const v1::CreateSnapshotRequest* request,
+                                           v1::Snapshot* response) override;
+  grpc::ServerUnaryReactor* ListSnapshots(grpc::CallbackServerContext* context,
+                                          const v1::ListSnapshotsRequest* request,
+                                          v1::ListSnapshotsResponse* response) override;
+  grpc::ServerUnaryReactor* RestoreSession(grpc::CallbackServerContext* context,
+                                           const v1::RestoreSessionRequest* request,
+                                           v1::Session* response) override;
+
   // Answers every creation and ends every interaction under way: the server is going down.
   void drain();
 
  private:
   class Creation;
-  grpc::Status begin(const std::shared_ptr<Creation>& creation);  // or why not
+  using Make = std::function<grpc::Status(v1::Session&)>;
+  grpc::ServerUnaryReactor* create_later(grpc::Status status, v1::Session* response, Make make);
+  bool begin(const std::shared_ptr<Creation>& creation);
   void end(const std::shared_ptr<Creation>& creation);
   grpc::Status refusal(const Caller& caller, const v1::CreateSessionRequest& request,
                        const std::string& id) const;
   grpc::Status create(const Caller& caller, const v1::CreateSessionRequest& request,
                       v1::Session& response);
+  grpc::Status restore(const Caller& caller, const v1::RestoreSessionRequest& request,
+                       v1::Session& response);
+  grpc::Status enroll(const std::shared_ptr<Session>& session, const Caller& caller,
+                      const Request& name);
   grpc::Status created_before(const std::string& uid, v1::Session& response) const;
   grpc::Status list(const Caller& caller, const v1::ListSessionsRequest& request,
                     v1::ListSessionsResponse& response) const;

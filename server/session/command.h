@@ -18,19 +18,21 @@ namespace weft {
 // Why a command was not carried out.
 struct Refusal {
   enum class Why {
-    kDeleted,      // the session is gone
-    kDraining,     // the server is going
-    kBusy,         // too many commands wait
-    kRunning,      // stepping needs a paused session
-    kFailed,       // the solver diverged
-    kStale,        // expected_frame is not the newest frame
-    kNotAhead,     // until_frame is not past the newest frame
-    kInterrupted,  // the step was paused
-    kCancelled,    // the caller went away
-    kInvalid,      // see problems
-    kUnstable,     // see step, and text for the field to blame
-    kRequestUsed,  // the request's id was given to another call
-    kNotKept,      // its log cannot be written, see text
+    kDeleted,           // the session is gone
+    kDraining,          // the server is going
+    kBusy,              // too many commands wait
+    kRunning,           // stepping needs a paused session
+    kFailed,            // the solver diverged
+    kStale,             // expected_frame is not the newest frame
+    kNotAhead,          // until_frame is not past the newest frame
+    kInterrupted,       // the step was paused
+    kCancelled,         // the caller went away
+    kInvalid,           // see problems
+    kUnstable,          // see step, and text for the field to blame
+    kRequestUsed,       // the request's id was given to another call
+    kNotKept,           // its log cannot be written, see text
+    kSnapshotExists,    // there is a snapshot of that name, see text
+    kTooManySnapshots,  // of the session
   };
   Why why;
   std::int64_t frame = 0;  // newest frame
@@ -99,6 +101,13 @@ struct Act {
   Done done;
 };
 
-using Command = std::variant<StepCommand, RunCommand, PauseCommand, SetTextile, Act>;
+// Keeps the session as it is, under an id; empty: default_snapshot_id() of its newest frame.
+struct KeepSnapshot {
+  std::string id;
+  Request request;
+  Done done;
+};
+
+using Command = std::variant<StepCommand, RunCommand, PauseCommand, SetTextile, Act, KeepSnapshot>;
 
 }  // namespace weft

@@ -14,7 +14,8 @@ struct Limits {
   std::int64_t history_bytes_per_session = 64 << 20;  // frames with their encodings
   std::int64_t max_streams = 1024;                    // but tests of textiles
   std::int64_t max_streams_per_principal = 100'000;
-  std::int64_t max_tests = 8;  // that run or wait
+  std::int64_t max_snapshots_per_session = 16;  // on demand
+  std::int64_t max_tests = 8;                   // that run or wait
   std::int64_t max_request_bytes = 16 << 20;
   std::int64_t max_frame_bytes = 4 << 20;  // gRPC's default receive limit
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -35,7 +36,11 @@ struct TextileSet {
 struct Acted {
   std::vector<Action> actions;  // of one hand
 };
-using Event = std::variant<StepsBegun, StepsEnded, RunBegun, Paused, TextileSet, Acted>;
+struct SnapshotKept {
+  std::string id;
+};
+using Event =
+    std::variant<StepsBegun, StepsEnded, RunBegun, Paused, TextileSet, Acted, SnapshotKept>;
 
 // Something that was done to a session when `frame` was its newest.
 struct LogEntry {
@@ -55,6 +60,16 @@ struct Reach {
 
 struct SessionSnapshot;
 
+// A snapshot that was asked for.
+struct NamedSnapshot {
+  std::string id;
+  std::int64_t frame = 0;
+  std::chrono::system_clock::time_point create_time;
+  std::int64_t bytes = 0;
+  std::string numerics_id;  // of the server that took it
+  std::string damage;       // why it cannot be used; empty: it can
+};
+
 // Where the log of one session is written.
 class SessionLog {
  public:
@@ -72,16 +87,29 @@ class SessionLog {
   // after it may be forgotten.
   using Take = std::function<std::shared_ptr<const SessionSnapshot>()>;
   virtual bool offer(const Take& take, std::int64_t oldest) = 0;
+
+  // Keeps a snapshot until the session is erased. `kept` is called once, from any thread, with an
+  // error as in Written, or with what is kept. It counts once an entry says so.
+  using Kept = std::function<void(const std::string& error, const NamedSnapshot& snapshot)>;
+  virtual void keep(const std::string& id, std::shared_ptr<const SessionSnapshot> snapshot,
+                    const Kept& kept) = 0;
+  // Forgets one that did not come to count.
+  virtual void drop(const std::string& id) = 0;
 };
 
 // Keeps nothing: the session ends with the process.
-class NoLog final : public SessionLog {
+class NoLog : public SessionLog {
  public:
   void write(const std::optional<LogEntry>& /*entry*/, const Reach& /*reach*/,
              const Written& written) override {
     written({});
   }
   bool offer(const Take& /*take*/, std::int64_t /*oldest*/) override { return false; }
+  void keep(const std::string& /*id*/, std::shared_ptr<const SessionSnapshot> /*snapshot*/,
+            const Kept& kept) override {
+    kept("nothing is kept of this session", {});
+  }
+  void drop(const std::string& /*id*/) override {}
 };
 
 }  // namespace weft

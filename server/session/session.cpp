@@ -60,6 +60,7 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
       scene_(simulation_.scene()),
       particle_count_(count_particles(scene_)),
       snapshot_after_(host.snapshot_after),
+      max_snapshots_(host.max_snapshots),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),
       history_(host.history_bytes) {
@@ -69,20 +70,27 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
 bool Session::restore(SessionPast past) {
   const bool begun = past.snapshot && begin_at(*past.snapshot, past);
   if (!begun && past.first > 0) return false;
+  bool repeats = false;
   {
     std::lock_guard lock(mutex_);
     reach_ = past.reach;
+    named_ = std::move(past.named);
     if (!begun && past.log.empty()) return true;
-    set_state(SessionState::kRestoring);
-    restoring_ = Restoring{{std::make_move_iterator(past.log.begin() + entries_ - past.first),
-                            std::make_move_iterator(past.log.end())},
-                           past.reach.frame};
+    const auto next = past.log.begin() + entries_ - past.first;
+    repeats = next != past.log.end() || run_ || !steps_.empty();
+    if (repeats) {
+      set_state(SessionState::kRestoring);
+      restoring_ =
+          Restoring{{std::make_move_iterator(next), std::make_move_iterator(past.log.end())},
+                    past.reach.frame};
+    }
     if (past.reach.history_from) readers_until_ = Clock::now() + kHoldAfterRestore;
     if (past.reach.holders > 0) {
       past_holders_ =
           PastHolders{past.reach.holders, past.reach.held_from, Clock::now() + kHoldAfterRestore};
     }
   }
+  if (!repeats) let_go_of_streams();
   wake();
   return true;
 }
@@ -166,19 +174,19 @@ bool Session::settle() {
 }
 
 bool Session::settle_writing() {
-  std::function<void(const std::string&)> then;
-  std::string error;
-  {
-    std::lock_guard lock(mutex_);
-    if (!writing_.then) return true;
-    if (!writing_.written) return false;
-    then = std::exchange(writing_.then, nullptr);
-    error = *std::exchange(writing_.written, std::nullopt);
+  for (;;) {
+    std::function<void(const std::string&)> then;
+    std::string error;
+    {
+      std::lock_guard lock(mutex_);
+      if (!writing_.then) return true;
+      if (!writing_.written) return false;
+      then = std::exchange(writing_.then, nullptr);
+      error = *std::exchange(writing_.written, std::nullopt);
+    }
+    then(error);  // which may write again
+    if (snapshot_due()) offer_snapshot();
   }
-  if (error.empty()) ++entries_;
-  then(error);
-  if (snapshot_due()) offer_snapshot();
-  return true;
 }
 
 // Repeats what was done at this frame; false where there is more, after the next frame.
@@ -325,7 +333,10 @@ void Session::write(const Request& request, const Event& event,
     std::lock_guard lock(mutex_);
     entry.frame = latest();
     reach = reach_to(reach_after(entry.event));
-    writing_.then = std::move(then);
+    writing_.then = [this, then = std::move(then)](const std::string& error) {
+      if (error.empty()) ++entries_;
+      then(error);
+    };
     writing_.written.reset();
   }
   log_->write(entry, reach, [self = shared_from_this(), reach](const std::string& error) {
@@ -456,6 +467,10 @@ Outcome Session::apply(const Event& event) {
   if (const auto* run = std::get_if<RunBegun>(&event)) return apply(*run);
   if (const auto* change = std::get_if<TextileSet>(&event)) return apply(*change);
   if (const auto* acted = std::get_if<Acted>(&event)) return apply(*acted);
+  if (std::holds_alternative<SnapshotKept>(event)) {
+    std::lock_guard lock(mutex_);
+    return applied(latest());
+  }
   assert(std::holds_alternative<Paused>(event));
   return pause();
 }
@@ -769,10 +784,11 @@ std::int64_t Session::reach_after(const Event& event) const {
     const std::int64_t ahead = latest() + ahead_;
     return run->until_frame ? std::min(ahead, std::max(*run->until_frame, goal())) : ahead;
   }
-  const bool goes_on =
-      std::holds_alternative<TextileSet>(event) || std::holds_alternative<Acted>(event)
-          ? active()
-          : std::holds_alternative<StepsEnded>(event) && run_.has_value();
+  const bool goes_on = std::holds_alternative<TextileSet>(event) ||
+                               std::holds_alternative<Acted>(event) ||
+                               std::holds_alternative<SnapshotKept>(event)
+                           ? active()
+                           : std::holds_alternative<StepsEnded>(event) && run_.has_value();
   return goes_on ? std::max(latest(), reach_.frame) : latest();
 }
 

@@ -52,7 +52,8 @@ struct SessionPast {
   Reach reach;
   // At most at reach.history_from, or as early as there is one.
   std::optional<SessionSnapshot> snapshot = {};
-  std::int64_t first = 0;  // entries that were forgotten before those of `log`
+  std::int64_t first = 0;                 // entries that were forgotten before those of `log`
+  std::vector<NamedSnapshot> named = {};  // in order of frame
 };
 
 // Hears what an operator should know: repairs and failures, a line each. Called from any thread,
@@ -67,6 +68,7 @@ struct SessionHost {
   Notify notify = {};
   // Computing between two snapshots; a session of more than 20 000 particles has them more rarely.
   std::chrono::duration<double> snapshot_after{2};
+  std::size_t max_snapshots = 16;  // on demand
 };
 
 // A simulation that advances on a scheduler. Calls reach it as commands that are carried out
@@ -103,6 +105,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   // As it was created; for textiles see status(). Actions do not show.
   const Scene& scene() const { return scene_; }
   SessionStatus status() const;
+  // Those that were asked for, in order of frame.
+  std::vector<NamedSnapshot> snapshots() const;
 
   void submit(Command command);
 
@@ -140,9 +144,10 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   };
   // Writes to the log that are under way.
   struct Writing {
-    std::function<void(const std::string& error)> then;  // of an entry; the session waits for it
-    std::optional<std::string> written;                  // its outcome
-    bool reach = false;                                  // of the reach alone
+    // Of an entry, or a snapshot on demand; the session waits for it.
+    std::function<void(const std::string& error)> then;
+    std::optional<std::string> written;  // its outcome
+    bool reach = false;                  // of the reach alone
   };
   // What is left of a past to be computed again.
   struct Restoring {
@@ -168,6 +173,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   void execute(PauseCommand command);
   void execute(SetTextile command);
   void execute(Act command);
+  void execute(KeepSnapshot command);
+  std::optional<Refusal> refusal_of(const KeepSnapshot& command) const;
+  void enter(const KeepSnapshot& command, const NamedSnapshot& made, const std::string& error);
   bool settle_steps();
   void begin_step();
   void end_step();
@@ -236,6 +244,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   const std::chrono::duration<double> snapshot_after_;
   std::chrono::duration<double> work_{};  // since the last snapshot; touched by the slice only
   std::int64_t entries_in_snapshot_ = 0;  // the last one; touched by the slice only
+  const std::size_t max_snapshots_;
 
   mutable std::mutex mutex_;  // guards all below
   std::deque<Command> commands_;
@@ -253,6 +262,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::vector<Subscription*> subscriptions_;
   bool held_ = false;  // idle until somebody comes, or a subscriber reads on
   Clock::time_point attended_;
+  std::vector<NamedSnapshot> named_;  // in order of frame
   Writing writing_;
   Reach reach_;                   // as it was written last
   std::int64_t ahead_ = 16;       // frames that the reach is put ahead

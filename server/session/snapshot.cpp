@@ -35,6 +35,7 @@ void Session::offer_snapshot() {
 std::shared_ptr<const SessionSnapshot> Session::snapshot() const {
   auto made = std::make_shared<SessionSnapshot>();
   made->entries = entries_;
+  made->create_time = std::chrono::system_clock::now();
   made->simulation = simulation_.snapshot();
   answers_.for_each([&](const Request& request, const Outcome& outcome) {
     made->answers.push_back({request, outcome});
@@ -92,6 +93,87 @@ bool Session::begin_at(const SessionSnapshot& from, const SessionPast& past) {
     }
   }
   return true;
+}
+
+std::string default_snapshot_id(std::int64_t frame) { return "frame-" + std::to_string(frame); }
+
+std::vector<NamedSnapshot> Session::snapshots() const {
+  std::lock_guard lock(mutex_);
+  return named_;
+}
+
+// Written before the log says so: what it says is there. The session stands still meanwhile.
+void Session::execute(KeepSnapshot command) {
+  std::shared_ptr<const SessionSnapshot> taken;
+  auto refusal = refusal_of(command);
+  if (!refusal) {
+    taken = snapshot();
+    if (!taken) refusal = refusal_of(command);  // closed meanwhile
+  }
+  if (!taken) return command.done(*refusal);
+  if (command.id.empty()) command.id = default_snapshot_id(taken->simulation.frame);
+  const auto made = std::make_shared<NamedSnapshot>();
+  {
+    std::lock_guard lock(mutex_);
+    writing_.then = [this, command, made](const std::string& error) {
+      enter(command, *made, error);
+    };
+    writing_.written.reset();
+  }
+  log_->keep(
+      command.id, taken,
+      [self = shared_from_this(), made](const std::string& error, const NamedSnapshot& kept) {
+        {
+          std::lock_guard lock(self->mutex_);
+          *made = kept;
+          self->writing_.written = error;
+        }
+        self->wake();
+      });
+}
+
+// What keeps the snapshot from being taken.
+std::optional<Refusal> Session::refusal_of(const KeepSnapshot& command) const {
+  std::lock_guard lock(mutex_);
+  if (auto refusal = refusal_of_change()) return refusal;
+  const std::string id = command.id.empty() ? default_snapshot_id(latest()) : command.id;
+  const auto same = [&](const NamedSnapshot& each) { return each.id == id; };
+  if (std::any_of(named_.begin(), named_.end(), same)) {
+    Refusal refusal = refuse(Refusal::Why::kSnapshotExists);
+    refusal.text = id;
+    return refusal;
+  }
+  if (named_.size() >= max_snapshots_) return refuse(Refusal::Why::kTooManySnapshots);
+  return std::nullopt;
+}
+
+// Has the log say that there is the snapshot, where it could be written.
+void Session::enter(const KeepSnapshot& command, const NamedSnapshot& made,
+                    const std::string& error) {
+  const auto not_kept = [this](const std::string& why) {
+    std::lock_guard lock(mutex_);
+    Refusal refusal = refuse(Refusal::Why::kNotKept);
+    refusal.text = why;
+    return refusal;
+  };
+  if (!error.empty()) return command.done(not_kept(error));
+  write(command.request, SnapshotKept{command.id},
+        [this, command, made, not_kept](const std::string& why) {
+          if (!why.empty()) {
+            log_->drop(command.id);
+            return command.done(not_kept(why));
+          }
+          Outcome outcome;
+          {
+            std::lock_guard lock(mutex_);
+            const auto after =
+                std::find_if(named_.begin(), named_.end(),
+                             [&](const NamedSnapshot& each) { return each.frame > made.frame; });
+            named_.insert(after, made);
+            outcome = applied(latest());
+          }
+          answer(command.request, command.done, outcome);
+        });
 }
 
 }  // namespace weft

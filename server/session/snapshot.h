@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -19,9 +20,13 @@ struct SessionSnapshot {
   };
   std::string numerics_id;   // of the server that kept it; empty until it is kept
   std::int64_t entries = 0;  // of the log, that were carried out before it
+  std::chrono::system_clock::time_point create_time;
   Snapshot simulation;
   std::vector<LogEntry> under_way;  // the beginnings of a run and a step
   std::vector<Answered> answers;    // that are remembered, oldest first
 };
+
+// "frame-120"
+std::string default_snapshot_id(std::int64_t frame);
 
 }  // namespace weft

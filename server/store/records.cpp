@@ -58,6 +58,10 @@ void set(stored::LogEntry* to, const Acted& from) {
   }
 }
 
+void set(stored::LogEntry* to, const SnapshotKept& from) {
+  to->mutable_snapshot_kept()->set_id(from.id);
+}
+
 Acted acted_of(const stored::Acted& from) {
   Acted acted;
   for (const auto& action : from.actions()) {
@@ -92,6 +96,8 @@ Event event_of(const stored::LogEntry& from) {
                         from.textile_set().duration_s()};
     case stored::LogEntry::kActed:
       return acted_of(from.acted());
+    case stored::LogEntry::kSnapshotKept:
+      return SnapshotKept{from.snapshot_kept().id()};
     case stored::LogEntry::EVENT_NOT_SET:
       break;
   }
@@ -100,14 +106,18 @@ Event event_of(const stored::LogEntry& from) {
 
 }  // namespace
 
+std::chrono::system_clock::time_point time_of(const google::protobuf::Timestamp& timestamp) {
+  const std::chrono::nanoseconds since_epoch(TimeUtil::TimestampToNanoseconds(timestamp));
+  return std::chrono::system_clock::time_point(
+      std::chrono::duration_cast<std::chrono::system_clock::duration>(since_epoch));
+}
+
 std::string encode(const KeptSession& session) {
   stored::KeptSession to;
   to.set_id(session.identity.id);
   to.set_uid(session.identity.uid);
   to.set_numerics_id(session.identity.numerics_id);
-  const auto since_epoch = session.identity.create_time.time_since_epoch();
-  *to.mutable_create_time() = TimeUtil::NanosecondsToTimestamp(
-      std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count());
+  *to.mutable_create_time() = timestamp_of(session.identity.create_time);
   *to.mutable_scene() = as_given(session.scene);
   to.set_owner(session.identity.owner);
   return to.SerializeAsString();
@@ -134,11 +144,7 @@ std::string encode(const LogEntry& entry) {
 
 KeptSession decode_session(const std::string& bytes) {
   const auto from = parse<stored::KeptSession>(bytes);
-  const std::chrono::nanoseconds created(TimeUtil::TimestampToNanoseconds(from.create_time()));
-  return {{from.id(), from.uid(), from.numerics_id(),
-           std::chrono::system_clock::time_point(
-               std::chrono::duration_cast<std::chrono::system_clock::duration>(created)),
-           from.owner()},
+  return {{from.id(), from.uid(), from.numerics_id(), time_of(from.create_time()), from.owner()},
           trusted(to_scene(from.scene(), "scene"))};
 }
 

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <google/protobuf/timestamp.pb.h>
+
+#include <chrono>
 #include <cstdint>
 #include <string>
 
@@ -23,6 +26,8 @@ KeptSession decode_session(const std::string& bytes);
 Progress decode_progress(const std::string& bytes);
 LogEntry decode_entry(const std::string& bytes);
 SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes);
+
+std::chrono::system_clock::time_point time_of(const google::protobuf::Timestamp& timestamp);
 
 // CRC-32 of the record and what it is filed under.
 std::uint32_t checksum(const std::string& key, const std::string& record);

@@ -15,9 +15,12 @@
 #include <memory>
 #include <sstream>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
+#include "server/rpc/server_service.h"
 #include "server/store/records.h"
+#include "server/store/store.h"
 
 namespace weft {
 namespace {
@@ -84,7 +87,7 @@ void sync(const fs::path& directory) {
 
 // Writes the file so that it is there whole or not at all; empty, or what was in the way.
 std::string write_whole(const fs::path& path, const std::string& bytes) {
-  const fs::path part = path.parent_path() / "part";
+  const fs::path part = path.parent_path() / ".part";
   std::error_code error;
   const bool first = fs::create_directories(path.parent_path(), error);
   const auto close = [](std::FILE* file) { return std::fclose(file); };
@@ -105,12 +108,19 @@ std::string write_whole(const fs::path& path, const std::string& bytes) {
   return "";
 }
 
-void keep(const fs::path& directory, const std::string& uid, const SessionSnapshot& snapshot,
-          std::int64_t oldest, const SnapshotFiles::Forget& forget) try {
+std::string content_of(const std::string& uid, const SessionSnapshot& snapshot) {
+  const std::string record = records::encode(uid, snapshot);
+  return kMagic + checksum_text(uid, record) + record;
+}
+
+// Those on demand have a directory within that of their session.
+fs::path named_in(const fs::path& directory) { return directory / "named"; }
+
+void keep_latest(const fs::path& directory, const std::string& uid, const SessionSnapshot& snapshot,
+                 std::int64_t oldest, const SnapshotFiles::Forget& forget) try {
   constexpr std::int64_t kMostEntries = SnapshotFiles::kMostEntries;
   const fs::path file = file_of(directory, place_of(snapshot));
-  const std::string record = records::encode(uid, snapshot);
-  const std::string error = write_whole(file, kMagic + checksum_text(uid, record) + record);
+  const std::string error = write_whole(file, content_of(uid, snapshot));
   if (!error.empty()) return spdlog::warn("{} cannot be written: {}", file.string(), error);
 
   // what readers could find is let go where the log would grow too long for it
@@ -124,6 +134,19 @@ void keep(const fs::path& directory, const std::string& uid, const SessionSnapsh
   if (places.size() > 1 && places[1].frame <= oldest) forget(places.front().entries);
 } catch (const std::exception& error) {  // out of memory
   spdlog::warn("{}: no snapshot: {}", directory.string(), error.what());
+}
+
+NamedSnapshot keep_named(const fs::path& file, const std::string& uid,
+                         const SessionSnapshot& snapshot) {
+  const std::string content = content_of(uid, snapshot);
+  const std::string error = write_whole(file, content);
+  if (!error.empty()) throw StoreError(file.string() + " cannot be written: " + error);
+  return {file.filename().string(),
+          snapshot.simulation.frame,
+          snapshot.create_time,
+          static_cast<std::int64_t>(content.size()),
+          numerics_id(),
+          {}};
 }
 
 SessionSnapshot read_whole(const fs::path& path, const std::string& uid) {
@@ -154,7 +177,7 @@ bool SnapshotFiles::write(const std::string& uid, const SessionLog::Take& take, 
   };
   const auto snapshot = take();
   const auto work = [directory = directory_ / uid, uid, snapshot, oldest, forget, done] {
-    keep(directory, uid, *snapshot, oldest, forget);
+    keep_latest(directory, uid, *snapshot, oldest, forget);
     done();
   };
   const bool posted = snapshot && thread_.post(work);
@@ -188,6 +211,68 @@ std::optional<SessionSnapshot> SnapshotFiles::read(const std::string& uid,
   }
   for (const SnapshotPlace& place : places_in(directory))
     if (!found || place > place_of(*found)) discard(file_of(directory, place));
+  return found;
+}
+
+void SnapshotFiles::begin(const std::string& uid, const SessionSnapshot& snapshot) {
+  const fs::path file = file_of(directory_ / uid, place_of(snapshot));
+  const std::string error = write_whole(file, content_of(uid, snapshot));
+  if (!error.empty()) throw StoreError(file.string() + " cannot be written: " + error);
+}
+
+void SnapshotFiles::keep(const std::string& uid, const std::string& id,
+                         std::shared_ptr<const SessionSnapshot> snapshot,
+                         const SessionLog::Kept& kept) {
+  const auto work = [file = named_in(directory_ / uid) / id, uid, snapshot = std::move(snapshot),
+                     kept] {
+    NamedSnapshot made;
+    std::string error;
+    try {
+      made = keep_named(file, uid, *snapshot);
+    } catch (const std::exception& what) {  // out of memory, too
+      error = what.what();
+    }
+    kept(error, made);
+  };
+  if (!thread_.post(work)) kept("too many snapshots wait to be written", {});
+}
+
+void SnapshotFiles::drop(const std::string& uid, const std::string& id) {
+  const auto work = [file = named_in(directory_ / uid) / id] { discard(file); };
+  if (!thread_.post(work)) work();
+}
+
+SessionSnapshot SnapshotFiles::read(const std::string& uid, const std::string& id) const {
+  return read_whole(named_in(directory_ / uid) / id, uid);
+}
+
+std::vector<NamedSnapshot> SnapshotFiles::named(const std::string& uid,
+                                                std::int64_t entries) const {
+  std::vector<NamedSnapshot> found;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(named_in(directory_ / uid), error)) {
+    NamedSnapshot named;
+    named.id = entry.path().filename().string();
+    named.bytes = static_cast<std::int64_t>(entry.file_size(error));
+    try {
+      const SessionSnapshot snapshot = read_whole(entry.path(), uid);
+      named.frame = snapshot.simulation.frame;
+      named.create_time = snapshot.create_time;
+      named.numerics_id = snapshot.numerics_id;
+      if (snapshot.entries >= entries) {
+        discard(entry.path());
+        continue;
+      }
+    } catch (const StoreError& what) {
+      if (named.id.starts_with('.')) continue;  // not written to its end
+      spdlog::warn("{} is damaged: {}", entry.path().string(), what.what());
+      named.damage = what.what();
+    }
+    found.push_back(std::move(named));
+  }
+  std::sort(found.begin(), found.end(), [](const NamedSnapshot& a, const NamedSnapshot& b) {
+    return std::tie(a.frame, a.id) < std::tie(b.frame, b.id);
+  });
   return found;
 }
 

@@ -46,6 +46,18 @@ class SnapshotFiles {
   std::optional<SessionSnapshot> read(const std::string& uid, std::optional<std::int64_t> not_after,
                                       std::int64_t first) const;
 
+  // Writes the first one of a session, and waits until it is safe. Throws StoreError.
+  void begin(const std::string& uid, const SessionSnapshot& snapshot);
+
+  // As SessionLog::keep(), drop() and SessionStore::named_snapshot().
+  void keep(const std::string& uid, const std::string& id,
+            std::shared_ptr<const SessionSnapshot> snapshot, const SessionLog::Kept& kept);
+  void drop(const std::string& uid, const std::string& id);
+  SessionSnapshot read(const std::string& uid, const std::string& id) const;
+  // Those that were kept so and came before so many entries of the log, in order of frame. Later
+  // ones are removed: nobody was told of them.
+  std::vector<NamedSnapshot> named(const std::string& uid, std::int64_t entries) const;
+
   void erase(const std::string& uid);
   // Removes those of other sessions.
   void keep_only(const std::set<std::string>& uids);

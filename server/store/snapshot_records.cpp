@@ -121,6 +121,7 @@ std::string encode(const std::string& uid, const SessionSnapshot& snapshot) {
   to.set_uid(uid);
   to.set_numerics_id(numerics_id());
   to.set_entries(snapshot.entries);
+  *to.mutable_create_time() = timestamp_of(snapshot.create_time);
   to.set_frame(simulation.frame);
   to.set_substeps(simulation.substeps);
   to.set_frames_at_rest(simulation.frames_at_rest);
@@ -152,6 +153,7 @@ SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes
   SessionSnapshot snapshot;
   snapshot.numerics_id = from.numerics_id();
   snapshot.entries = from.entries();
+  snapshot.create_time = time_of(from.create_time());
   std::vector<std::shared_ptr<const Plan>> plans;
   for (const auto& plan : from.plans())
     plans.push_back(std::make_shared<const Plan>(plan_of(plan)));

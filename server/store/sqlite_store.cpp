@@ -106,7 +106,11 @@ class SqliteStore final : public SessionStore {
                                           const SessionPast& past) override {
     return snapshots_.read(uid, past.reach.history_from, past.first);
   }
-  void add(const KeptSession& session, const Request& creation) override;
+  void add(const KeptSession& session, const Request& creation,
+           const SessionSnapshot* beginning) override;
+  SessionSnapshot named_snapshot(const std::string& uid, const std::string& id) override {
+    return snapshots_.read(uid, id);
+  }
   std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t entries) override;
   void erase(const std::string& uid, const Request& deletion,
              const SessionLog::Written& written) override;
@@ -232,15 +236,23 @@ LeftSession SqliteStore::load_session(const std::string& uid, const std::string&
       throw StoreError("its log is out of order");
   }
   if (next >= 0 && next != progress.entries) throw StoreError("its log has lost its end");
+  left.past.named = snapshots_.named(uid, progress.entries);
   return left;
 }
 
-void SqliteStore::add(const KeptSession& session, const Request& creation) {
+void SqliteStore::add(const KeptSession& session, const Request& creation,
+                      const SessionSnapshot* beginning) {
   std::promise<std::string> done;
   const std::string& uid = session.identity.uid;
+  records::Progress come;
+  if (beginning != nullptr) {
+    snapshots_.begin(uid, *beginning);
+    come.entries = beginning->entries;
+    come.reach.frame = beginning->simulation.frame;
+  }
   post(
       [&, record = records::encode(session),
-       progress = records::encode(records::Progress{})](SQLite::Database& database) {
+       progress = records::encode(come)](SQLite::Database& database) {
         SQLite::Statement insert(database, "INSERT INTO session VALUES (?, ?, ?, ?)");
         insert.bind(1, uid);
         insert.bind(2, session.identity.id);
@@ -319,6 +331,12 @@ class SqliteStore::Log final : public SessionLog {
     };
     return store_.snapshots_.write(uid_, take, oldest, forget);
   }
+
+  void keep(const std::string& id, std::shared_ptr<const SessionSnapshot> snapshot,
+            const Kept& kept) override {
+    store_.snapshots_.keep(uid_, id, std::move(snapshot), kept);
+  }
+  void drop(const std::string& id) override { store_.snapshots_.drop(uid_, id); }
 
  private:
   // False where the session was deleted.

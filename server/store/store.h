@@ -55,8 +55,14 @@ class SessionStore {
   // What an earlier process left. Called once, first.
   virtual LeftBehind load() = 0;
 
-  // Keeps a new session, made by `creation`, and waits until it is safe. Throws StoreError.
-  virtual void add(const KeptSession& session, const Request& creation) = 0;
+  // Keeps a new session, made by `creation`, and waits until it is safe. It begins with its scene,
+  // or at a snapshot that says to come after one entry of a log, which is forgotten. Throws
+  // StoreError.
+  virtual void add(const KeptSession& session, const Request& creation,
+                   const SessionSnapshot* beginning) = 0;
+
+  // A snapshot that was kept on demand. Throws StoreError where it is missing or damaged.
+  virtual SessionSnapshot named_snapshot(const std::string& uid, const std::string& id) = 0;
 
   // The newest sound snapshot of a session at most at the frame of its reach's history, if there is
   // one; else, where its log does not reach back to frame 0, the oldest sound one after that. What

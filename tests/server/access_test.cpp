@@ -125,7 +125,8 @@ TEST_F(AccessTest, HealthWantsNone) {
 const FieldDescriptor* session_field(const MethodDescriptor& method) {
   const bool of_session = method.service()->name() == "SessionService";
   const auto* field = method.input_type()->FindFieldByName(of_session ? "name" : "session");
-  if (field == nullptr) field = method.input_type()->FindFieldByName("session");
+  for (const char* other : {"session", "parent"})
+    if (field == nullptr) field = method.input_type()->FindFieldByName(other);
   return field != nullptr && field->type() == FieldDescriptor::TYPE_STRING ? field : nullptr;
 }
 
@@ -149,7 +150,9 @@ TEST_F(AccessTest, ASessionIsNobodyElsesOnAnyMethodAndLooksAsIfThereWereNone) {
     if (const auto* credits = method->input_type()->FindFieldByName("credits"))
       request->GetReflection()->SetInt32(request.get(), credits, 1);
     const auto ask = [&](const std::string& token, const std::string& name) {
-      request->GetReflection()->SetString(request.get(), field, name);
+      const bool of_snapshot = method->name() == "RestoreSession";
+      request->GetReflection()->SetString(request.get(), field,
+                                          of_snapshot ? name + "/snapshots/it" : name);
       return raw_call(*service_, path_of_method(*method), request->SerializeAsString(),
                       method->server_streaming(), token)
           .second;

@@ -370,6 +370,9 @@ std::vector<std::string> known_requests(const std::string& type) {
       {"StepSessionRequest", "name: 'sessions/it' frames: 2 expected_frame: 0"},
       {"RunSessionRequest", "name: 'sessions/it' time_scale: 2 until_frame: 3 until_rest: true"},
       {"PauseSessionRequest", "name: 'sessions/it'"},
+      {"CreateSnapshotRequest", "parent: 'sessions/it' snapshot_id: 'another'"},
+      {"ListSnapshotsRequest", "parent: 'sessions/it'"},
+      {"RestoreSessionRequest", "name: 'sessions/it/snapshots/it' session_id: 'new'"},
       {"InteractRequest", "session: 'sessions/it' sequence: 1 action { grab { particle: 3 } }"},
       {"StreamFramesRequest",
        "session: 'sessions/it' start_frame: 0 end_frame: 0 format { encoding: "
@@ -472,6 +475,11 @@ class Subject {
         service_.call(&Service::Sessions::ListSessions, v1::ListSessionsRequest(), &list).ok());
     for (const auto& session : list.sessions()) service_.erase(session);
     session_ = service_.create(small_scene(), "it");
+    v1::CreateSnapshotRequest snapshot;
+    snapshot.set_parent(session_.name());
+    snapshot.set_snapshot_id("it");
+    EXPECT_EQ(service_.error(&Service::Sessions::CreateSnapshot, snapshot).code,
+              grpc::StatusCode::OK);
     before_ = service_.get(session_).SerializeAsString();
   }
 

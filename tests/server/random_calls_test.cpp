@@ -31,6 +31,8 @@ struct Call {
     kRelease,
     kPin,
     kUnpin,
+    kSnapshot,
+    kRestore,
     kAgain,
     kRestart,
     kKinds
@@ -43,8 +45,8 @@ struct Call {
 
 std::ostream& operator<<(std::ostream& out, const Call& call) {
   constexpr std::array<const char*, Call::kKinds> kNames = {
-      "create", "delete",  "step", "run",   "pause", "set textile", "grab",
-      "drag",   "release", "pin",  "unpin", "again", "restart"};
+      "create",  "delete", "step",  "run",      "pause",   "set textile", "grab",   "drag",
+      "release", "pin",    "unpin", "snapshot", "restore", "again",       "restart"};
   return out << kNames[call.kind] << " s" << call.session << ' ' << call.number << " particle "
              << call.particle;
 }
@@ -69,6 +71,8 @@ struct Arbitrary<weft::testing::Call> {
                                                           {2, Call::kRelease},
                                                           {2, Call::kPin},
                                                           {2, Call::kUnpin},
+                                                          {3, Call::kSnapshot},
+                                                          {3, Call::kRestore},
                                                           {2, Call::kAgain},
                                                           {1, Call::kRestart}}),
                                [](int value) { return static_cast<Call::Kind>(value); });
@@ -90,6 +94,11 @@ struct Modelled {
   Simulation simulation;
   std::string shown;  // positions of its newest frame
   std::set<int> grabbed = {}, pinned = {0, 4};
+  struct Kept {
+    Snapshot state;
+    std::set<int> grabbed, pinned;
+  };
+  std::map<std::string, Kept> kept = {};  // by the snapshot's id
 };
 
 class History {
@@ -115,6 +124,11 @@ class History {
         return pause();
       case Call::kSetTextile:
         return set_textile(call.number, call.particle);
+      case Call::kSnapshot:
+        return keep(call.number);
+      case Call::kRestore:
+        return restore(id, "s" + std::to_string(std::abs(call.session - call.number) % 3),
+                       call.number);
       case Call::kAgain:
         return again();
       case Call::kRestart:
@@ -197,8 +211,7 @@ class History {
     } else {
       ask(&Sessions::CreateSession, request, StatusCode::OK, "");
       again_ = {};  // answers with the session as it is by then
-      const auto scene = to_scene(small_scene(), "scene");
-      model_.emplace(id, Modelled{Simulation(std::get<Scene>(scene)), {}});
+      model_.emplace(id, Modelled{simulation(), {}});
       there_ = &model_.at(id);
       advance(0);
     }
@@ -342,6 +355,55 @@ class History {
     if (call.kind == Call::kRelease) there_->grabbed.erase(p);
     if (call.kind == Call::kPin) there_->pinned.insert(p);
     if (call.kind == Call::kUnpin) there_->pinned.erase(p);
+  }
+
+  static Simulation simulation() {
+    return Simulation(std::get<Scene>(to_scene(small_scene(), "scene")));
+  }
+
+  void keep(int number) {
+    v1::CreateSnapshotRequest request;
+    request.set_parent(name_);
+    if (number >= 0) request.set_snapshot_id("n" + std::to_string(number));
+    if (there_ == nullptr) {
+      ask(&Sessions::CreateSnapshot, request, StatusCode::NOT_FOUND, "SESSION_NOT_FOUND");
+      return;
+    }
+    const std::string id = number < 0 ? "frame-" + std::to_string(frame()) : request.snapshot_id();
+    if (there_->kept.contains(id)) {
+      ask(&Sessions::CreateSnapshot, request, StatusCode::ALREADY_EXISTS, "SNAPSHOT_EXISTS");
+      return;
+    }
+    const auto response = ask(&Sessions::CreateSnapshot, request, StatusCode::OK, "");
+    RC_ASSERT(response.name() == name_ + "/snapshots/" + id);
+    RC_ASSERT(response.frame() == frame());
+    there_->kept.emplace(
+        id, Modelled::Kept{there_->simulation.snapshot(), there_->grabbed, there_->pinned});
+  }
+
+  void restore(const std::string& id, const std::string& from, int number) {
+    const auto source = model_.find(from);
+    const std::string frame =
+        source == model_.end() ? "0" : std::to_string(source->second.simulation.frame());
+    const std::string snapshot = number < 0 ? "frame-" + frame : "n" + std::to_string(number);
+    v1::RestoreSessionRequest request;
+    request.set_name("sessions/" + from + "/snapshots/" + snapshot);
+    request.set_session_id(id);
+    if (source == model_.end()) {
+      ask(&Sessions::RestoreSession, request, StatusCode::NOT_FOUND, "SESSION_NOT_FOUND");
+    } else if (!source->second.kept.contains(snapshot)) {
+      ask(&Sessions::RestoreSession, request, StatusCode::NOT_FOUND, "SNAPSHOT_NOT_FOUND");
+    } else if (there_ != nullptr) {
+      ask(&Sessions::RestoreSession, request, StatusCode::ALREADY_EXISTS, "SESSION_EXISTS");
+    } else {
+      ask(&Sessions::RestoreSession, request, StatusCode::OK, "");
+      again_ = {};  // answers with the session as it is by then
+      const auto& kept = source->second.kept.at(snapshot);
+      Modelled restored{simulation(), {}, kept.grabbed, kept.pinned};
+      RC_ASSERT(restored.simulation.restore(kept.state));
+      restored.shown = positions(restored.simulation);
+      model_.emplace(id, std::move(restored));
+    }
   }
 
   // As a frame in double precision has them.

@@ -378,7 +378,7 @@ class RestartWithSnapshots : public Restart {
     for (;;) {
       const std::int64_t before = last_of(session);
       const std::int64_t frame = service_->step(session).frame();
-      for (int look = 0; look < 10'000 && last_of(session) == before; ++look)
+      for (int look = 0; look < 500 && last_of(session) == before; ++look)
         std::this_thread::yield();
       if (last_of(session) == frame) return frame;
     }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <map>
 #include <thread>
 
 #include "tests/server/session/session_support.h"
@@ -21,6 +22,7 @@ struct Disk {
   bool slow = false;
   std::vector<std::function<void()>> waiting;  // writes that take their time
   std::vector<std::shared_ptr<const SessionSnapshot>> snapshots;
+  std::map<std::string, std::shared_ptr<const SessionSnapshot>> named;
   std::atomic<int> offers = 0;  // of snapshots
   std::function<void()> before_snapshot;
 
@@ -79,6 +81,24 @@ class DiskLog : public SessionLog {
     if (snapshot) disk_->snapshots.push_back(snapshot);
     ++disk_->offers;
     return snapshot != nullptr;
+  }
+
+  void keep(const std::string& id, std::shared_ptr<const SessionSnapshot> snapshot,
+            const Kept& kept) override {
+    std::string error;
+    {
+      std::lock_guard lock(disk_->mutex);
+      error = disk_->error;
+      if (error.empty()) disk_->named[id] = snapshot;
+    }
+    NamedSnapshot named;
+    named.id = id;
+    named.frame = snapshot->simulation.frame;
+    kept(error, named);
+  }
+  void drop(const std::string& id) override {
+    std::lock_guard lock(disk_->mutex);
+    disk_->named.erase(id);
   }
 
  private:
@@ -322,6 +342,25 @@ TEST_F(SessionLogTest, TakesASnapshotAfterManyCalls) {
   pause(*session).applied();  // after it
   ASSERT_EQ(disk_->offers, 1);
   EXPECT_EQ(disk_->past().snapshot->entries, 500);
+}
+
+TEST_F(SessionLogTest, SaysThatThereIsASnapshotOnceThatIsWritten) {
+  const auto session = make(disk_);
+  step(*session, 3).applied();
+  disk_->fail("the disk is full");
+  EXPECT_EQ(Answer(*session, KeepSnapshot{"a", {}, {}}).refused(), Refusal::Why::kNotKept);
+  EXPECT_THAT(session->snapshots(), SizeIs(0));
+  disk_->fail("");
+  EXPECT_EQ(Answer(*session, KeepSnapshot{"a", {"name", 1}, {}}).applied().newest, 3);
+  const SessionPast past = disk_->past();
+  ASSERT_THAT(past.log, SizeIs(2));
+  EXPECT_EQ(std::get<SnapshotKept>(past.log.back().event).id, "a");
+  EXPECT_EQ(disk_->named.at("a")->entries, 1);
+  ASSERT_THAT(session->snapshots(), SizeIs(1));
+  EXPECT_EQ(session->snapshots().front().frame, 3);
+  // a restart knows the answer, and takes none again
+  const auto again = restored(past);
+  EXPECT_EQ(Answer(*again, KeepSnapshot{"a", {"name", 1}, {}}).applied().newest, 3);
 }
 
 TEST_F(SessionLogTest, NeedsASnapshotWhereItsBeginningWasForgotten) {

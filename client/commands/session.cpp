@@ -1,9 +1,14 @@
+#include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
+
 #include "client/commands/commands.h"
 #include "client/output/text.h"
 #include "client/scene_file.h"
 
 namespace weft::client {
 namespace {
+
+using google::protobuf::util::TimeUtil;
 
 struct CreateOptions {
   std::string path;
@@ -34,6 +39,53 @@ void run_get(Context& context, const std::string& name) {
   context.answer(to_json(session), session_text(session) + plan_text(session.plan()));
 }
 
+struct SnapshotOptions {
+  std::string session;
+  std::string id;
+};
+
+void run_snapshot(Context& context, const SnapshotOptions& options) {
+  v1::CreateSnapshotRequest request;
+  request.set_parent(context.session_name(options.session));
+  request.set_snapshot_id(options.id);
+  const v1::Snapshot snapshot = context.connection().call(&Sessions::CreateSnapshot, request);
+  context.answer(to_json(snapshot),
+                 fmt::format("kept {}, {}, {}\n", snapshot.name(), seconds_text(snapshot.time_s()),
+                             bytes_text(snapshot.size_bytes())));
+}
+
+void run_snapshots(Context& context, const std::string& session) {
+  v1::ListSnapshotsRequest request;
+  request.set_parent(context.session_name(session));
+  const auto all = context.connection().call(&Sessions::ListSnapshots, request);
+  Table table({"SNAPSHOT", "FRAME", "TIME", "SIZE", "TAKEN", "NUMERICS", "STATE"});
+  for (const auto& snapshot : all.snapshots()) {
+    table.add({snapshot.name().substr(snapshot.name().rfind('/') + 1),
+               std::to_string(snapshot.frame()), seconds_text(snapshot.time_s()),
+               bytes_text(snapshot.size_bytes()),
+               TimeUtil::ToString(TimeUtil::SecondsToTimestamp(snapshot.create_time().seconds())),
+               snapshot.numerics_id(),
+               snapshot.damage().empty() ? "sound" : "damaged: " + snapshot.damage()});
+  }
+  context.answer(to_json(all), all.snapshots().empty() ? "no snapshots\n" : table.text());
+}
+
+struct RestoreOptions {
+  std::string session;
+  std::string snapshot;
+  std::string id;
+};
+
+void run_restore(Context& context, const RestoreOptions& options) {
+  v1::RestoreSessionRequest request;
+  request.set_name(context.session_name(options.session) + "/snapshots/" + options.snapshot);
+  request.set_session_id(options.id);
+  const v1::Session session = context.connection().call(&Sessions::RestoreSession, request);
+  context.answer(to_json(session),
+                 fmt::format("created {}, paused at frame {}, {}\n", session.name(),
+                             session.frame(), seconds_text(session.time_s())));
+}
+
 struct DeleteOptions {
   std::string session;
   bool allow_missing = false;
@@ -50,7 +102,7 @@ void run_delete(Context& context, const DeleteOptions& options) {
 }  // namespace
 
 void add_session(CLI::App& app, Context& context) {
-  CLI::App* session = add_group(app, "session", "Create, show and delete sessions");
+  CLI::App* session = add_group(app, "session", "Create, show, keep and delete sessions");
 
   auto create = std::make_shared<CreateOptions>();
   CLI::App* command =
@@ -67,6 +119,29 @@ void add_session(CLI::App& app, Context& context) {
   command = session->add_subcommand("get", "Show one session");
   add_session_argument(*command, *name);
   command->callback([&context, name] { run_get(context, *name); });
+
+  auto snapshot = std::make_shared<SnapshotOptions>();
+  command = session->add_subcommand("snapshot", "Keep a session as it is, to be restored");
+  add_session_argument(*command, snapshot->session);
+  command->add_option("--id", snapshot->id, "Name of the snapshot; else it is frame-N")
+      ->type_name("NAME");
+  command->callback([&context, snapshot] { run_snapshot(context, *snapshot); });
+
+  auto of = std::make_shared<std::string>();
+  command = session->add_subcommand("snapshots", "List the snapshots of a session");
+  add_session_argument(*command, *of);
+  command->callback([&context, of] { run_snapshots(context, *of); });
+
+  auto restore = std::make_shared<RestoreOptions>();
+  command = session->add_subcommand(
+      "restore", "Make a session that goes on from a snapshot of another, which stays as it is");
+  add_session_argument(*command, restore->session);
+  command->add_option("SNAPSHOT", restore->snapshot, "Name of the snapshot, such as frame-120")
+      ->option_text(" ")
+      ->required();
+  command->add_option("--id", restore->id, "Name of the new session; else the server picks one")
+      ->type_name("NAME");
+  command->callback([&context, restore] { run_restore(context, *restore); });
 
   auto remove = std::make_shared<DeleteOptions>();
   command = session->add_subcommand("delete", "End a session and its streams");

@@ -51,6 +51,11 @@ TEST_F(CommandsTest, ASceneGoesFromTemplateThroughSessionAndRecordingToAnExport)
   const auto exported = ask({"export", recording, "--format", "csv", "-o", path("drape.csv")});
   EXPECT_EQ(exported["frames"], 13);
   EXPECT_EQ(exported["particles"], 63);
+  EXPECT_EQ(ask({"session", "snapshot", "drape"})["name"], "sessions/drape/snapshots/frame-12");
+  EXPECT_EQ(ask({"session", "snapshots", "drape"})["snapshots"].size(), 1);
+  EXPECT_EQ(ask({"session", "restore", "drape", "frame-12", "--id", "again"})["name"],
+            "sessions/again");
+  ask({"session", "delete", "again"});
   EXPECT_EQ(ask({"session", "delete", "drape"})["deleted"], "sessions/drape");
   EXPECT_TRUE(ask({"session", "list"})["sessions"].empty());
 }
@@ -171,7 +176,7 @@ TEST_F(CommandsTest, AShellCompletesCommandsOptionsValuesAndSessions) {
     return run_weft(words).out;
   };
   EXPECT_EQ(completed({"text"}), "textile\n");
-  EXPECT_EQ(completed({"session", ""}), "create\ndelete\nget\nlist\n");
+  EXPECT_EQ(completed({"session", ""}), "create\ndelete\nget\nlist\nrestore\nsnapshot\nsnapshots\n");
   EXPECT_EQ(completed({"record", "drape", "--e"}), "--embedded\n--encoding\n");
   EXPECT_EQ(completed({"export", "a.weft", "--format", "p"}), "pc2\n");
   EXPECT_EQ(completed({"run", ""}), "drape\n");

@@ -176,7 +176,8 @@ TEST_F(CommandsTest, AShellCompletesCommandsOptionsValuesAndSessions) {
     return run_weft(words).out;
   };
   EXPECT_EQ(completed({"text"}), "textile\n");
-  EXPECT_EQ(completed({"session", ""}), "create\ndelete\nget\nlist\nrestore\nsnapshot\nsnapshots\n");
+  EXPECT_EQ(completed({"session", ""}),
+            "create\ndelete\nget\nlist\nrestore\nsnapshot\nsnapshots\n");
   EXPECT_EQ(completed({"record", "drape", "--e"}), "--embedded\n--encoding\n");
   EXPECT_EQ(completed({"export", "a.weft", "--format", "p"}), "pc2\n");
   EXPECT_EQ(completed({"run", ""}), "drape\n");

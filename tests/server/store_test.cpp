@@ -378,8 +378,11 @@ class RestartWithSnapshots : public Restart {
     for (;;) {
       const std::int64_t before = last_of(session);
       const std::int64_t frame = service_->step(session).frame();
-      for (int look = 0; look < 500 && last_of(session) == before; ++look)
+      const auto part = snapshots_of(session) / ".part";
+      for (int look = 0; last_of(session) == before; ++look) {
+        if (look > 500 && !std::filesystem::exists(part)) break;  // it was left out
         std::this_thread::yield();
+      }
       if (last_of(session) == frame) return frame;
     }
   }

@@ -92,6 +92,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_diff(app, context);
   add_cut(app, context);
   add_join(app, context);
+  add_replay(app, context);
   add_export(app, context);
   add_plot(app, context);
   add_render(app, context);

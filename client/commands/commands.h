@@ -1,7 +1,9 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/context.h"
@@ -22,6 +24,7 @@ void add_top(CLI::App& app, Context& context);
 void add_watch(CLI::App& app, Context& context);
 void add_record(CLI::App& app, Context& context);
 void add_info(CLI::App& app, Context& context);
+void add_replay(CLI::App& app, Context& context);
 void add_verify(CLI::App& app, Context& context);
 void add_diff(CLI::App& app, Context& context);
 void add_cut(CLI::App& app, Context& context);
@@ -57,6 +60,10 @@ void add_session_or_scene_argument(CLI::App& command, std::string& given);
 
 // "A:B", both included; either may be left out, and an empty text is all frames.
 FrameRange read_frame_range(const std::string& text);
+
+// "HOST:PORT" as its parts. Refused where other machines reach it, and that is not what is wanted.
+std::pair<std::string, std::uint16_t> read_address(const char* option, const std::string& text,
+                                                   bool insecure);
 
 // All of them, from as many pages as it takes.
 v1::ListSessionsResponse list_sessions(Connection& connection);

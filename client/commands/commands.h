@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -53,6 +54,22 @@ using Textiles = v1::TextileService::Stub;
 
 // A command that only holds others.
 CLI::App* add_group(CLI::App& app, const char* name, const char* description);
+
+// Takes the names of a map, and says which there are where it is given another.
+template <class Value>
+CLI::Validator one_of(const std::map<std::string, Value>& values) {
+  const auto find = [values](std::string& text) {
+    const auto found = values.find(text);
+    if (found != values.end()) {
+      text = std::to_string(static_cast<int>(found->second));
+      return std::string();
+    }
+    std::string names;
+    for (const auto& [name, value] : values) names += (names.empty() ? "" : ", ") + name;
+    return '"' + text + "\" is none of " + names;
+  };
+  return {find, "", ""};
+}
 
 // The positional SESSION.
 void add_session_argument(CLI::App& command, std::string& session);

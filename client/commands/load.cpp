@@ -366,7 +366,7 @@ void add_load(CLI::App& app, Context& context) {
       ->check(CLI::Range(0, 100'000))
       ->capture_default_str();
   command->add_option("--drive", order.drive, "What makes sessions advance [paced]")
-      ->transform(CLI::CheckedTransformer(drives))
+      ->transform(one_of(drives))
       ->option_text("paced|stepped|free");
   command->add_option("--rate", options->rate, "Frames a second [the scene's own]")
       ->type_name("R")

@@ -1,5 +1,8 @@
 #include "client/context.h"
 
+#include <condition_variable>
+#include <mutex>
+
 #include "client/problem.h"
 #include "client/scene_file.h"
 
@@ -22,6 +25,12 @@ std::string Context::session_or_scene(const std::string& given) {
 
 void Context::answer(const Json& document, const std::string& text) {
   terminal.out << (json ? document.dump() + '\n' : text) << std::flush;
+}
+
+void Context::await_stop() const {
+  std::mutex mutex;
+  std::unique_lock lock(mutex);
+  std::condition_variable_any().wait(lock, stop, [] { return false; });
 }
 
 }  // namespace weft::client

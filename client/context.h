@@ -32,6 +32,8 @@ class Context {
 
   // Prints the answer: the document for scripts, the text for people.
   void answer(const Json& document, const std::string& text);
+  // Waits for Ctrl-C.
+  void await_stop() const;
 
  private:
   std::unique_ptr<Connection> connection_;

@@ -78,6 +78,10 @@ Problem server_problem(const grpc::Status& status) {
   if (!info && status.error_code() == grpc::StatusCode::UNAVAILABLE) {
     return {Exit::kNoConnection, "UNAVAILABLE", "NO_CONNECTION", status.error_message()};
   }
+  if (!info && status.error_code() == grpc::StatusCode::UNIMPLEMENTED) {
+    return {Exit::kRefused, "UNIMPLEMENTED", "",
+            "the server has no such method; is it a replay, or of another version?"};
+  }
   Problem problem(Exit::kRefused, code_name(status.error_code()), info ? info->reason() : "",
                   status.error_message());
   if (const auto bad = find_detail<google::rpc::BadRequest>(status)) {

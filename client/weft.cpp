@@ -46,6 +46,20 @@ std::string problem_text(const Problem& problem) {
   return text;
 }
 
+// What the command line has too much of, by the command that stands before it.
+Problem surplus(const CLI::App& app, const std::string& word) {
+  const CLI::App* command = &app;
+  std::string name = app.get_name();
+  while (!command->get_subcommands().empty()) {
+    command = command->get_subcommands().front();
+    name += ' ' + command->get_name();
+  }
+  const char* what = word.starts_with('-')                  ? "option"
+                     : command->get_subcommands({}).empty() ? "further argument"
+                                                            : "command";
+  return usage_problem(fmt::format("{} has no {} {}; see {} --help", name, what, word, name));
+}
+
 int report(const Problem& problem, const Context& context) {
   const char* name = context.terminal.err_is_watched ? "\x1b[1;31mweft:\x1b[0m " : "weft: ";
   context.terminal.err << (context.json ? to_json(problem).dump() + '\n'
@@ -92,6 +106,7 @@ void add_commands(CLI::App& app, Context& context) {
   add_diff(app, context);
   add_cut(app, context);
   add_join(app, context);
+  add_replay(app, context);
   add_export(app, context);
   add_plot(app, context);
   add_render(app, context);
@@ -137,6 +152,8 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
     app.parse(std::move(arguments));
     if (app.get_subcommands().empty()) throw usage_problem("which command? see weft --help");
     return static_cast<int>(Exit::kDone);
+  } catch (const CLI::ExtrasError&) {
+    return report(surplus(app, app.remaining(true).front()), context);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, terminal.out, terminal.err);
     return report(usage_problem(std::string(error.what()) + "; see --help"), context);

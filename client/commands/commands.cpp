@@ -63,6 +63,26 @@ FrameRange read_frame_range(const std::string& text) {
   return range;
 }
 
+std::pair<std::string, std::uint16_t> read_address(const char* option, const std::string& text,
+                                                   bool insecure) {
+  const std::size_t colon = text.rfind(':');
+  const std::string port = colon == std::string::npos ? "" : text.substr(colon + 1);
+  const bool digits = !port.empty() && port.size() <= 5 &&
+                      port.find_first_not_of("0123456789") == std::string::npos;
+  if (colon == 0 || !digits || std::stoi(port) > 65535)
+    throw usage_problem(fmt::format("{} {}: write HOST:PORT", option, text));
+  std::string host = text.substr(0, colon);
+  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
+  const bool loopback = host == "localhost" || host == "::1" || host.starts_with("127.");
+  if (!loopback && !insecure) {
+    throw usage_problem(
+        fmt::format("{} is {}, which other machines can reach, and nothing is encrypted; add "
+                    "--insecure if that is what you want",
+                    option, text));
+  }
+  return {host, static_cast<std::uint16_t>(std::stoi(port))};
+}
+
 std::string state_text(v1::SessionState state) {
   switch (state) {
     case v1::SESSION_STATE_PAUSED:

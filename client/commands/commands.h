@@ -1,7 +1,10 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/context.h"
@@ -22,6 +25,7 @@ void add_top(CLI::App& app, Context& context);
 void add_watch(CLI::App& app, Context& context);
 void add_record(CLI::App& app, Context& context);
 void add_info(CLI::App& app, Context& context);
+void add_replay(CLI::App& app, Context& context);
 void add_verify(CLI::App& app, Context& context);
 void add_diff(CLI::App& app, Context& context);
 void add_cut(CLI::App& app, Context& context);
@@ -51,12 +55,32 @@ using Textiles = v1::TextileService::Stub;
 // A command that only holds others.
 CLI::App* add_group(CLI::App& app, const char* name, const char* description);
 
+// Takes the names of a map, and says which there are where it is given another.
+template <class Value>
+CLI::Validator one_of(const std::map<std::string, Value>& values) {
+  const auto find = [values](std::string& text) {
+    const auto found = values.find(text);
+    if (found != values.end()) {
+      text = std::to_string(static_cast<int>(found->second));
+      return std::string();
+    }
+    std::string names;
+    for (const auto& [name, value] : values) names += (names.empty() ? "" : ", ") + name;
+    return '"' + text + "\" is none of " + names;
+  };
+  return {find, "", ""};
+}
+
 // The positional SESSION.
 void add_session_argument(CLI::App& command, std::string& session);
 void add_session_or_scene_argument(CLI::App& command, std::string& given);
 
 // "A:B", both included; either may be left out, and an empty text is all frames.
 FrameRange read_frame_range(const std::string& text);
+
+// "HOST:PORT" as its parts. Refused where other machines reach it, and that is not what is wanted.
+std::pair<std::string, std::uint16_t> read_address(const char* option, const std::string& text,
+                                                   bool insecure);
 
 // All of them, from as many pages as it takes.
 v1::ListSessionsResponse list_sessions(Connection& connection);

@@ -48,7 +48,7 @@ void add_export(CLI::App& app, Context& context) {
                    "gltf: an animated mesh, .glb\nvtk: a collection of meshes, .pvd\n"
                    "usda: an animated mesh in USD text\ncsv: a row for every frame")
       ->required()
-      ->transform(CLI::CheckedTransformer(formats))
+      ->transform(one_of(formats))
       ->option_text("obj|pc2|mdd|gltf|vtk|usda|csv, REQUIRED");
   command->add_option("-o,--output", order.path, "File to write; for obj a directory")
       ->type_name("PATH")

@@ -214,7 +214,7 @@ void add_bending_options(CLI::App& command, LabOptions& options) {
     command.add_flag("--isometric", options.isometric,
                      "Isometric bending instead of Choi and Ko's");
   command.add_option("--evaluator", options.evaluator, "Of the bending curve [linearized]")
-      ->transform(CLI::CheckedTransformer(evaluators))
+      ->transform(one_of(evaluators))
       ->option_text("series|exact|linearized|polynomial");
   command.add_option("--segments", options.segments, "Line segments of the linearized curve")
       ->type_name("N")

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <functional>
 #include <tuple>
 
 #include "client/commands/commands.h"
@@ -25,6 +27,7 @@ struct LoadOptions {
   bool find_limit = false;
   std::optional<double> target_s;
   std::string against;
+  std::vector<std::string> compare;
 };
 
 constexpr std::array kQuantiles{std::pair{"p50", 0.5}, std::pair{"p90", 0.9},
@@ -33,6 +36,10 @@ constexpr std::array kQuantiles{std::pair{"p50", 0.5}, std::pair{"p90", 0.9},
 
 double frames_per_s(const LoadResult& result) {
   return static_cast<double>(result.frames_received) / result.wall.count();
+}
+
+double frames_per_s(const LoadOrder& order, const StageResult& stage) {
+  return static_cast<double>(stage.frames_received) / order.duration.count();
 }
 
 std::string errors_text(const LoadResult& result) {
@@ -51,13 +58,26 @@ std::string frames_text(const LoadOrder& order, const LoadResult& result) {
 
 std::vector<std::string> progress_lines(const LoadOrder& order, const LoadResult& result,
                                         double elapsed_s) {
-  const double whole = (order.ramp + order.duration).count();
+  const auto stages = static_cast<double>(result.stages.size());
+  const double whole = stages * (order.ramp + order.duration).count();
   return {fmt::format("{}  {:.0f} of {:.0f} s", bar(elapsed_s / whole), elapsed_s, whole),
-          fmt::format("sessions  {} of {}", result.sessions, order.sessions),
+          fmt::format("sessions  {} of {}", result.sessions, result.stages.back().sessions),
           fmt::format("frames    {}", frames_text(order, result)),
           fmt::format("lateness  {} p50, {} p99", seconds_text(result.frame.quantile(0.5)),
                       seconds_text(result.frame.quantile(0.99))),
           fmt::format("errors    {}", result.error_count())};
+}
+
+// Of each stage.
+std::string stages_text(const LoadOrder& order, const LoadResult& result) {
+  Table table({"SESSIONS", "CREATE P99", "P50", "P99", "P99.9", "MAX", "FRAMES/S", "ERRORS"});
+  for (const StageResult& stage : result.stages) {
+    table.add({std::to_string(stage.sessions), seconds_text(stage.create.quantile(0.99)),
+               seconds_text(stage.frame.quantile(0.5)), seconds_text(stage.frame.quantile(0.99)),
+               seconds_text(stage.frame.quantile(0.999)), seconds_text(stage.frame.quantile(1)),
+               fmt::format("{:.0f}", frames_per_s(order, stage)), std::to_string(stage.errors)});
+  }
+  return table.text();
 }
 
 std::string load_text(const LoadOrder& order, const LoadResult& result) {
@@ -79,12 +99,27 @@ std::string load_text(const LoadOrder& order, const LoadResult& result) {
       .add("own processor", fmt::format("{:.2f} of a core", result.cpu / result.wall));
   for (const auto& [reason, count] : result.errors)
     facts.add("errors", fmt::format("{} x {}", count, reason));
-  return table.text() + '\n' + facts.text();
+  const std::string stages =
+      result.stages.size() > 1 ? stages_text(order, result) + '\n' : std::string();
+  return stages + table.text() + '\n' + facts.text();
+}
+
+template <class Result>
+Json times_json(const Result& result) {
+  Json json;
+  for (const auto& [name, latencies] :
+       {std::pair{"create_s", &result.create}, std::pair{"step_s", &result.step},
+        std::pair{"frame_s", &result.frame}}) {
+    json[name]["count"] = latencies->count();
+    for (const auto& [label, fraction] : kQuantiles)
+      json[name][label] = latencies->quantile(fraction);
+  }
+  return json;
 }
 
 Json load_json(const LoadOrder& order, const LoadResult& result) {
   constexpr std::array kDrives{"paced", "stepped", "free"};
-  Json json{{"sessions", order.sessions},
+  Json json{{"sessions", result.stages.back().sessions},
             {"subscribers", order.subscribers},
             {"drive", kDrives[static_cast<std::size_t>(order.drive)]},
             {"rate_per_s", order.rate_per_s},
@@ -97,12 +132,14 @@ Json load_json(const LoadOrder& order, const LoadResult& result) {
             {"substeps", result.substeps},
             {"wall_s", result.wall.count()},
             {"cpu_s", result.cpu.count()}};
-  for (const auto& [name, latencies] :
-       {std::pair{"create_s", &result.create}, std::pair{"step_s", &result.step},
-        std::pair{"frame_s", &result.frame}}) {
-    json[name]["count"] = latencies->count();
-    for (const auto& [label, fraction] : kQuantiles)
-      json[name][label] = latencies->quantile(fraction);
+  json.update(times_json(result));
+  json["stages"] = Json::array();
+  for (const StageResult& stage : result.stages) {
+    Json stage_json{{"sessions", stage.sessions},
+                    {"frames_per_s", frames_per_s(order, stage)},
+                    {"errors", stage.errors}};
+    stage_json.update(times_json(stage));
+    json["stages"].push_back(std::move(stage_json));
   }
   json["errors"] = result.errors;
   return json;
@@ -126,6 +163,15 @@ std::string change_text(const Json& before, const Json& now) {
     for (const char* quantile : {"p50", "p99", "max"}) {
       add(fmt::format("{} {}", name, quantile), before.at(times).at(quantile),
           now.at(times).at(quantile), seconds_text);
+    }
+  }
+  const Json stages_before = before.value("stages", Json::array());
+  const Json stages_now = now.value("stages", Json::array());
+  for (const Json& was : stages_before) {
+    for (const Json& is : stages_now) {
+      if (stages_now.size() < 2 || was.at("sessions") != is.at("sessions")) continue;
+      add(fmt::format("{} sessions: frame p99", is.at("sessions").get<int>()),
+          was.at("frame_s").at("p99"), is.at("frame_s").at("p99"), seconds_text);
     }
   }
   add("frames lost", before.at("frames_lost"), now.at("frames_lost"), number_text);
@@ -167,7 +213,7 @@ void load_once(Context& context, const LoadOrder& order, const std::string& agai
       against.empty() ? std::nullopt : std::optional(read_earlier(against));
   LoadView view(context, order);
   const LoadResult result = apply_load(context.connection(), order, [&](const LoadResult& so_far) {
-    view.show(order.sessions, so_far);
+    view.show(order.sessions_of_stages().back(), so_far);
   });
   view.clear();
   const Json json = load_json(order, result);
@@ -180,6 +226,12 @@ void load_once(Context& context, const LoadOrder& order, const std::string& agai
                   fmt::format("{}, {} lost, {} doubled", count_of(result.error_count(), "error"),
                               count_of(result.frames_lost, "frame"), result.frames_doubled));
   }
+}
+
+void compare(Context& context, const std::vector<std::string>& paths) {
+  const Json before = read_earlier(paths[0]);
+  const Json now = read_earlier(paths[1]);
+  context.answer({{"before", before}, {"now", now}}, change_text(before, now));
 }
 
 std::string why_not(const Probe& probe) {
@@ -231,14 +283,27 @@ v1::Scene checked_scene(Connection& connection, const LoadOptions& options) {
   return create_session(connection, scene, request).scene();
 }
 
+void check_stages(const LoadOrder& order) {
+  const std::vector<int>& stages = order.stages;
+  const bool rise =
+      std::adjacent_find(stages.begin(), stages.end(), std::greater_equal()) == stages.end();
+  if (!rise || (!stages.empty() && (stages.front() < 1 || stages.back() > 100'000)))
+    throw usage_problem("--stages: write rising numbers of sessions, 1 to 100000, as in 10,20,40");
+  if (!stages.empty() && order.frames)
+    throw usage_problem("--frames would end sessions before the last of the --stages");
+}
+
 void run_load(Context& context, const LoadOptions& options) {
+  if (!options.compare.empty()) return compare(context, options.compare);
   LoadOrder order = options.order;
+  check_stages(order);
   if (order.drive == Drive::kFree && options.find_limit)
     throw usage_problem("--find-limit: no frame is late where the drive is free");
   constexpr std::int64_t kMostStreams = 100'000;
-  if (std::int64_t{order.sessions} * order.subscribers > kMostStreams) {
+  const int sessions = order.sessions_of_stages().back();
+  if (std::int64_t{sessions} * order.subscribers > kMostStreams) {
     throw usage_problem(fmt::format("{} sessions x {} subscribers are more than {} streams",
-                                    order.sessions, order.subscribers, kMostStreams));
+                                    sessions, order.subscribers, kMostStreams));
   }
   if ((order.frames || options.find_limit) && order.subscribers == 0)
     throw usage_problem("--subscribers 0: nobody would count the frames");
@@ -284,16 +349,24 @@ void add_load(CLI::App& app, Context& context) {
       ->type_name("NAME")
       ->excludes(scene)
       ->capture_default_str();
-  command->add_option("--sessions", order.sessions, "How many; with --find-limit the first try")
-      ->type_name("N")
-      ->check(CLI::Range(1, 100'000))
-      ->capture_default_str();
+  auto* sessions =
+      command->add_option("--sessions", order.sessions, "How many; with --find-limit the first try")
+          ->type_name("N")
+          ->check(CLI::Range(1, 100'000))
+          ->capture_default_str();
+  auto* stages = command
+                     ->add_option("--stages", order.stages,
+                                  "Rising numbers instead, figures for each: 10,20,40")
+                     ->type_name("N,N...")
+                     ->delimiter(',')
+                     ->allow_extra_args(false)
+                     ->excludes(sessions);
   command->add_option("--subscribers", order.subscribers, "Streams of each session")
       ->type_name("N")
       ->check(CLI::Range(0, 100'000))
       ->capture_default_str();
   command->add_option("--drive", order.drive, "What makes sessions advance [paced]")
-      ->transform(CLI::CheckedTransformer(drives))
+      ->transform(one_of(drives))
       ->option_text("paced|stepped|free");
   command->add_option("--rate", options->rate, "Frames a second [the scene's own]")
       ->type_name("R")
@@ -301,16 +374,18 @@ void add_load(CLI::App& app, Context& context) {
   command->add_option("--frames", order.frames, "End when each session has so many")
       ->type_name("N")
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000}));
-  command->add_option("--ramp", options->ramp_s, "Seconds in which the sessions are created")
+  command->add_option("--ramp", options->ramp_s, "Seconds in which a stage creates its sessions")
       ->type_name("S")
       ->check(CLI::Range(0.0, 1e5))
       ->capture_default_str();
-  command->add_option("--duration", options->duration_s, "Seconds after the ramp")
+  command->add_option("--duration", options->duration_s, "Seconds of a stage after the ramp")
       ->type_name("S")
       ->check(CLI::Range(0.01, 1e6))
       ->capture_default_str();
-  auto* limit = command->add_flag("--find-limit", options->find_limit,
-                                  "Search how many sessions hold --target");
+  auto* limit =
+      command
+          ->add_flag("--find-limit", options->find_limit, "Search how many sessions hold --target")
+          ->excludes(stages);
   command->add_option("--target", options->target_s, "Lateness 99 of 100 may have, s [an interval]")
       ->type_name("S")
       ->check(CLI::PositiveNumber)
@@ -318,6 +393,9 @@ void add_load(CLI::App& app, Context& context) {
   command->add_option("--against", options->against, "Compare with an earlier answer to --json")
       ->type_name("FILE")
       ->excludes(limit);
+  command->add_option("--compare", options->compare, "Load nothing; compare two answers to --json")
+      ->type_name("BEFORE AFTER")
+      ->expected(2);
   command->footer(kLoadFooter);
   command->callback([&context, options] { run_load(context, *options); });
 }

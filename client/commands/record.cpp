@@ -93,7 +93,7 @@ void add_record(CLI::App& app, Context& context) {
   command
       ->add_option("--encoding", order.encoding,
                    "Numbers in the file [float32]; quantized: within 0.05 mm")
-      ->transform(CLI::CheckedTransformer(encodings))
+      ->transform(one_of(encodings))
       ->option_text("float32|float64|quantized");
   command
       ->add_option("--patience", options->patience_s,

@@ -101,7 +101,7 @@ void add_render(CLI::App& app, Context& context) {
       ->add_option("--colour", order.colouring,
                    "cloth: a front and a back\nstrain: the largest at each particle\n"
                    "speed: of each particle since the frame before")
-      ->transform(CLI::CheckedTransformer(colourings))
+      ->transform(one_of(colourings))
       ->option_text("cloth|strain|speed");
   command
       ->add_option("--azimuth", order.outlook.azimuth,

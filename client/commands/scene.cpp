@@ -77,14 +77,14 @@ void add_new(CLI::App& scene, Context& context) {
   command->add_option("--bend", values.bend, "k_b in the paper's unit, 1e-4 N m^2 (paper-*)")
       ->type_name("K");
   command->add_option("--evaluator", values.evaluator, "How bending is computed")
-      ->transform(CLI::CheckedTransformer(evaluators))
+      ->transform(one_of(evaluators))
       ->option_text("series|exact|linearized|polynomial");
   command->add_option("--segments", values.segments, "Line segments of the linearized law")
       ->type_name("N")
       ->check(CLI::Range(1, 65536));
   command->add_flag("--fold-clamp", values.fold_clamp, "Linearize the clamped function (eq. 5)");
   command->add_option("--accuracy", values.accuracy, "How close to the equations, and how fast")
-      ->transform(CLI::CheckedTransformer(accuracies))
+      ->transform(one_of(accuracies))
       ->option_text("draft|standard|fine");
   command->footer(template_list());
   command->callback([&context, options] { run_new(context, *options); });

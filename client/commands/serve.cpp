@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
-#include <condition_variable>
 #include <filesystem>
-#include <mutex>
 
 #include "client/commands/commands.h"
 #include "client/serve/live_server.h"
@@ -18,24 +16,10 @@ struct ServeOptions {
 };
 
 LiveOrder order_of(const ServeOptions& options) {
-  const std::size_t colon = options.http.rfind(':');
-  const std::string port = colon == std::string::npos ? "" : options.http.substr(colon + 1);
-  const bool digits = !port.empty() && port.size() <= 5 &&
-                      port.find_first_not_of("0123456789") == std::string::npos;
-  if (colon == 0 || !digits || std::stoi(port) > 65535)
-    throw usage_problem(fmt::format("--http {}: write HOST:PORT", options.http));
-  std::string host = options.http.substr(0, colon);
-  if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  const bool loopback = host == "localhost" || host == "::1" || host.starts_with("127.");
-  if (!loopback && !options.insecure) {
-    throw usage_problem(
-        fmt::format("--http is {}, which other machines can reach, and nothing is encrypted; add "
-                    "--insecure if that is what you want",
-                    options.http));
-  }
+  auto [host, port] = read_address("--http", options.http, options.insecure);
   if (!std::filesystem::is_directory(options.recordings))
     throw unwritable(options.recordings, "it is no directory");
-  return {host, static_cast<std::uint16_t>(std::stoi(port)), options.recordings};
+  return {std::move(host), port, options.recordings};
 }
 
 void run_serve(Context& context, const ServeOptions& options) {
@@ -49,9 +33,7 @@ void run_serve(Context& context, const ServeOptions& options) {
   const std::string url = fmt::format("http://{}/{}", server.address(), page);
   context.answer({{"url", url}}, fmt::format("{} shows sessions, until Ctrl-C\n", url));
 
-  std::mutex mutex;
-  std::unique_lock lock(mutex);
-  std::condition_variable_any().wait(lock, context.stop, [] { return false; });
+  context.await_stop();
 }
 
 }  // namespace

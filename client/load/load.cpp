@@ -43,7 +43,11 @@ class Load {
   Load(Connection& connection, const LoadOrder& order,
        const std::function<void(const LoadResult&)>& progress)
       : connection_(connection), order_(order), progress_(progress) {
-    const std::int64_t streams = std::int64_t{order.sessions} * order.subscribers;
+    for (const int sessions : order.sessions_of_stages()) {
+      result_.stages.emplace_back();
+      result_.stages.back().sessions = sessions;
+    }
+    const std::int64_t streams = std::int64_t{session_count()} * order.subscribers;
     for (std::int64_t i = 0; i < streams; i += kStreamsOfAConnection)
       stream_connections_.push_back(connection.another());
   }
@@ -51,13 +55,18 @@ class Load {
   LoadResult apply() {
     const Seconds cpu = processor_time();
     start_ = Clock::now();
-    measured_from_ = start_ + ticks(order_.ramp);
-    end_ = measured_from_ + ticks(order_.duration);
-    sessions_ = std::vector<LoadedSession>(static_cast<std::size_t>(order_.sessions));
-    for (std::size_t i = 0; i < sessions_.size(); ++i) {
-      const double share = static_cast<double>(i) / static_cast<double>(sessions_.size());
-      sessions_[i].index = static_cast<int>(i);
-      agenda_.push({start_ + ticks(order_.ramp * share), &sessions_[i], 0});
+    end_ = stage_start(result_.stages.size());
+    sessions_ = std::vector<LoadedSession>(static_cast<std::size_t>(session_count()));
+    int before = 0;
+    for (std::size_t stage = 0; stage < result_.stages.size(); ++stage) {
+      const int sessions = result_.stages[stage].sessions;
+      for (int i = before; i < sessions; ++i) {
+        LoadedSession& session = sessions_[static_cast<std::size_t>(i)];
+        session.index = i;
+        const double share = static_cast<double>(i - before) / (sessions - before);
+        agenda_.push({stage_start(stage) + ticks(order_.ramp * share), &session, 0});
+      }
+      before = sessions;
     }
     const std::stop_callback wake(connection_.stop(), [this] {
       const std::lock_guard lock(mutex_);
@@ -165,6 +174,24 @@ class Load {
   };
 
   bool stopped() const { return connection_.stop().stop_requested(); }
+  int session_count() const { return result_.stages.back().sessions; }
+  Seconds stage_length() const { return order_.ramp + order_.duration; }
+  Clock::time_point stage_start(std::size_t stage) const {
+    return start_ + ticks(stage_length() * static_cast<double>(stage));
+  }
+  // Precondition: the time is not before the start.
+  StageResult& stage_at(Clock::time_point time) {
+    const auto stage = static_cast<std::size_t>(Seconds(time - start_) / stage_length());
+    return result_.stages[std::min(stage, result_.stages.size() - 1)];
+  }
+  // Whether it lies after the ramp of its stage.
+  bool is_timed(Clock::time_point time) const {
+    for (std::size_t stage = 0; stage < result_.stages.size(); ++stage) {
+      const auto start = stage_start(stage);
+      if (time >= start && time < start + ticks(order_.ramp)) return false;
+    }
+    return time >= start_;
+  }
   Seconds interval() const { return Seconds(1 / order_.rate_per_s); }
 
   void send_what_is_due() {
@@ -249,6 +276,7 @@ class Load {
   void count_error(const std::string& call, const grpc::Status& status) {
     if (status.ok()) return;
     const Problem problem = server_problem(status);
+    ++stage_at(Clock::now()).errors;
     ++result_.errors[call + ": " + (problem.reason.empty() ? problem.code : problem.reason)];
   }
 
@@ -260,7 +288,9 @@ class Load {
         [this, &session, due](const v1::Session* answer, Clock::time_point time) {
           {
             const std::lock_guard lock(mutex_);
-            result_.create.add(Seconds(time - due).count());
+            const double seconds = Seconds(time - due).count();
+            result_.create.add(seconds);
+            stage_at(due).create.add(seconds);
             if (answer == nullptr) return;
             session.session.set_name(answer->name());
             session.session.set_uid(answer->uid());
@@ -332,7 +362,7 @@ class Load {
         &Sessions::async_interface::StepSession, "step", request,
         [this, &session, step](const v1::StepSessionResponse* answer, Clock::time_point time) {
           const std::lock_guard lock(mutex_);
-          add_latency(result_.step, session, step, time);
+          add_step(session, step, time);
           session.steps = step;
           if (answer != nullptr) session.last_frame = answer->frame();
           if (!closing_) await_step(session, step + 1);
@@ -350,10 +380,21 @@ class Load {
     return order_.frames ? std::min(due, *order_.frames) : due;
   }
 
-  void add_latency(Latencies& latencies, const LoadedSession& session, std::int64_t frame,
-                   Clock::time_point time, std::int64_t count = 1) const {
+  void add_latency(Latencies LoadResult::*all, Latencies StageResult::*of_stage,
+                   const LoadedSession& session, std::int64_t frame, Clock::time_point time,
+                   std::int64_t count = 1) {
     const auto due = due_time(session, frame);
-    if (due >= measured_from_) latencies.add(Seconds(time - due).count(), count);
+    if (!is_timed(due)) return;
+    const double seconds = Seconds(time - due).count();
+    (result_.*all).add(seconds, count);
+    (stage_at(due).*of_stage).add(seconds, count);
+  }
+  void add_step(const LoadedSession& session, std::int64_t frame, Clock::time_point time) {
+    add_latency(&LoadResult::step, &StageResult::step, session, frame, time);
+  }
+  void add_frame(const LoadedSession& session, std::int64_t frame, Clock::time_point time,
+                 std::int64_t count = 1) {
+    add_latency(&LoadResult::frame, &StageResult::frame, session, frame, time, count);
   }
 
   void receive(LoadedSession& session, Subscriber& subscriber, const v1::Frame& frame,
@@ -363,6 +404,7 @@ class Load {
 
     const std::lock_guard lock(mutex_);
     ++result_.frames_received;
+    if (!closing_ && is_timed(time)) ++stage_at(time).frames_received;
     if (number < subscriber.next_frame) {
       ++result_.frames_doubled;
       return;
@@ -373,7 +415,7 @@ class Load {
     if (order_.drive != Drive::kFree) {
       session.origin =
           std::min(session.origin, time - ticks(interval() * static_cast<double>(number)));
-      add_latency(result_.frame, session, number, time);
+      add_frame(session, number, time);
     }
     if (closing_ || number == order_.frames) changed_.notify_all();
   }
@@ -433,9 +475,9 @@ class Load {
       for (const auto& subscriber : session.subscribers)
         result_.frames_lost += computed + 1 - subscriber->next_frame;
       for (std::int64_t frame = computed + 1; frame <= due; ++frame) {
-        add_latency(result_.frame, session, frame, end_, order_.subscribers);
+        add_frame(session, frame, end_, order_.subscribers);
         if (order_.drive == Drive::kStepped && frame > session.steps)
-          add_latency(result_.step, session, frame, end_);
+          add_step(session, frame, end_);
       }
     }
   }
@@ -467,7 +509,7 @@ class Load {
   const LoadOrder& order_;
   const std::function<void(const LoadResult&)>& progress_;
   std::vector<std::unique_ptr<Connection>> stream_connections_;
-  Clock::time_point start_, measured_from_;
+  Clock::time_point start_;
 
   std::mutex mutex_;  // guards all below
   std::condition_variable changed_;

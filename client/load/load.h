@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/connection.h"
 #include "client/load/latencies.h"
@@ -24,21 +25,36 @@ enum class Drive {
 struct LoadOrder {
   v1::Scene scene;
   int sessions = 10;
-  int subscribers = 1;  // of each session
+  std::vector<int> stages{};  // or as many up to each stage, rising
+  int subscribers = 1;        // of each session
   Drive drive = Drive::kPaced;
   double rate_per_s = 60;                      // frames a second of each session
   std::optional<std::int64_t> frames{};        // of each session, if it shall end after them
-  std::chrono::duration<double> ramp{1};       // in which the sessions are created, evenly
-  std::chrono::duration<double> duration{10};  // after the ramp
+  std::chrono::duration<double> ramp{1};       // of a stage: it creates its sessions, evenly
+  std::chrono::duration<double> duration{10};  // of a stage, after the ramp
   std::chrono::duration<double> grace{10};     // for answers and frames under way at the end
   // Hears of every frame received: of which session and subscriber, from 0. Called from any thread,
   // for one subscriber in order.
   std::function<void(int session, int subscriber, const v1::Frame&)> on_frame{};
+
+  std::vector<int> sessions_of_stages() const {
+    return stages.empty() ? std::vector{sessions} : stages;
+  }
+};
+
+// What was due in a stage after its ramp; creations within it.
+struct StageResult {
+  int sessions = 0;  // in all
+  Latencies create;
+  Latencies step;
+  Latencies frame;
+  std::int64_t frames_received = 0;  // after the ramp
+  std::int64_t errors = 0;           // that came in the stage
 };
 
 // Every latency counts from the time at which the call, or the frame, was due: a server that is
-// late with one does not make what waits behind it look prompt. Those due before the end of the
-// ramp are not timed, and those that never came count as they had waited at the end.
+// late with one does not make what waits behind it look prompt. Those due within a ramp are not
+// timed, and those that never came count as they had waited at the end.
 //
 // Frame k is due k intervals after the answer to the call that began the session's run, or earlier
 // where a frame came so early that it must have begun earlier.
@@ -46,6 +62,7 @@ struct LoadResult {
   Latencies create;
   Latencies step;   // kStepped
   Latencies frame;  // to each subscriber; not kFree
+  std::vector<StageResult> stages;
   std::int64_t sessions = 0;
   std::int64_t frames_due = 0;  // by the end, of all subscribers; not kFree
   std::int64_t frames_received = 0;

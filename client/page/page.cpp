@@ -148,12 +148,14 @@ Json colliders_json(const v1::Scene& scene) {
 struct Source {
   Source(const Exhibit& exhibit, const FrameRange& wanted)
       : name(exhibit.name),
+        facts(exhibit.facts),
         recording(exhibit.path),
         range(frames_of(recording, wanted)),
         survey(survey_of(recording, range)),
         quantum_m(quantum_of(recording.scene(), survey)) {}
 
   std::string name;
+  std::vector<std::pair<std::string, std::string>> facts;
   RecordingReader recording;
   FrameRange range;
   Survey survey;
@@ -163,6 +165,11 @@ struct Source {
 Json recording_json(const Source& source) {
   const RecordingReader& recording = source.recording;
   const Survey& survey = source.survey;
+  Json facts = page_facts(recording, survey.tally);
+  if (!source.facts.empty()) {
+    const Json measured{{"group", "Measured"}, {"rows", source.facts}};
+    facts.insert(facts.begin(), measured);
+  }
   return {{"name", source.name},
           {"particles", particles_of(recording.header())},
           {"first_frame", survey.tally.first_frame},
@@ -176,7 +183,7 @@ Json recording_json(const Source& source) {
           {"colliders", colliders_json(recording.scene())},
           {"gravity_m_per_s2",
            to_json(recording.scene().environment().gravity_m_per_s2(), Defaults::kLeftOut)},
-          {"facts", page_facts(recording, survey.tally)}};
+          {"facts", std::move(facts)}};
 }
 
 // As it may stand in a script element.

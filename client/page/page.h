@@ -4,6 +4,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "client/recording/frame_range.h"
@@ -12,8 +13,9 @@ namespace weft::client {
 
 // A recording as a page shows it.
 struct Exhibit {
-  std::string name;  // above it
-  std::string path;  // of the recording
+  std::string name;                                          // above it
+  std::string path;                                          // of the recording
+  std::vector<std::pair<std::string, std::string>> facts{};  // to be shown before its own
 };
 
 // Recordings that are shown side by side, in step.

@@ -204,7 +204,8 @@ MeasuredTextile Reader::preset(const std::string& name, const std::string& field
     return std::get<MeasuredTextile>(textile(values, field).model);
   }
   if (preset == nullptr) {
-    problem(field + ".preset", "there is no preset \"" + name + "\"; see ListTextiles");
+    problem(field + ".preset",
+            "there is no preset \"" + name + "\"; ListTextiles (weft textile list) names them all");
   } else {
     std::string lacking;
     for (const auto& value : preset->missing()) lacking += (lacking.empty() ? "" : ", ") + value;

@@ -113,26 +113,6 @@ std::string array_of(const std::vector<double>& values, const v1::FrameFormat& f
                                    : bytes_of(selected(values, wanted), format);
 }
 
-v1::StreamFramesResponse message_of(const Frame& frame, const v1::FrameFormat& format) {
-  v1::StreamFramesResponse message;
-  v1::Frame* to = message.mutable_frame();
-  to->set_number(frame.number);
-  to->set_time_s(frame.time);
-  to->set_positions_m(array_of(frame.positions, format));
-  if (format.velocities()) to->set_velocities_m_per_s(array_of(frame.velocities, format));
-  if (format.stats()) {
-    v1::FrameStats* stats = to->mutable_stats();
-    stats->set_kinetic_energy_j(frame.stats.kinetic_energy);
-    stats->set_potential_energy_j(frame.stats.potential_energy);
-    stats->set_largest_strain(frame.stats.largest_strain);
-    stats->set_substep_count(frame.substeps);
-    stats->set_substep_s(frame.substep);
-    stats->set_at_rest(frame.at_rest);
-    stats->set_repair_count(static_cast<std::int64_t>(frame.repairs.size()));
-  }
-  return message;
-}
-
 }  // namespace
 
 v1::FrameFormat with_defaults(v1::FrameFormat format) {
@@ -189,9 +169,30 @@ std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t p
   return problems;
 }
 
+v1::Frame to_proto(const Frame& frame, const v1::FrameFormat& format) {
+  v1::Frame message;
+  message.set_number(frame.number);
+  message.set_time_s(frame.time);
+  message.set_positions_m(array_of(frame.positions, format));
+  if (format.velocities()) message.set_velocities_m_per_s(array_of(frame.velocities, format));
+  if (format.stats()) {
+    v1::FrameStats* stats = message.mutable_stats();
+    stats->set_kinetic_energy_j(frame.stats.kinetic_energy);
+    stats->set_potential_energy_j(frame.stats.potential_energy);
+    stats->set_largest_strain(frame.stats.largest_strain);
+    stats->set_substep_count(frame.substeps);
+    stats->set_substep_s(frame.substep);
+    stats->set_at_rest(frame.at_rest);
+    stats->set_repair_count(static_cast<std::int64_t>(frame.repairs.size()));
+  }
+  return message;
+}
+
 grpc::ByteBuffer encoded_frame(const Frame& frame, const v1::FrameFormat& format) {
   const auto encoding = frame.encodings.get(format.SerializeAsString(), [&] {
-    auto buffer = std::make_shared<const grpc::ByteBuffer>(encoded(message_of(frame, format)));
+    v1::StreamFramesResponse message;
+    *message.mutable_frame() = to_proto(frame, format);
+    auto buffer = std::make_shared<const grpc::ByteBuffer>(encoded(message));
     return Encoding{buffer, buffer->Length()};
   });
   return *static_cast<const grpc::ByteBuffer*>(encoding.get());  // shares the bytes

@@ -22,6 +22,9 @@ std::int64_t frame_bytes(const v1::FrameFormat& format, std::int64_t particles);
 std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t particles,
                                    std::int64_t most_bytes);
 
+// The frame in a format that has its defaults filled in and no problems.
+v1::Frame to_proto(const Frame& frame, const v1::FrameFormat& format);
+
 // The message with this frame; its bytes are made once and shared by all who ask.
 grpc::ByteBuffer encoded_frame(const Frame& frame, const v1::FrameFormat& format);
 

@@ -168,6 +168,23 @@ TEST_F(CommandsTest, HelpIsAnAnswer) {
   EXPECT_THAT(unknown.err, HasSubstr("there is no command \"knit\""));
 }
 
+TEST_F(CommandsTest, AWrongCommandLineIsToldWhatThereIs) {
+  const auto told = [&](const std::vector<std::string>& arguments) {
+    const Outcome outcome = weft(arguments);
+    EXPECT_EQ(outcome.exit, 2);
+    return outcome.err;
+  };
+  EXPECT_EQ(told({"recrod", "drape"}), "weft: weft has no command recrod; see weft --help\n");
+  EXPECT_EQ(told({"scene", "knit"}),
+            "weft: weft scene has no command knit; see weft scene --help\n");
+  EXPECT_EQ(told({"run", "drape", "--fast"}),
+            "weft: weft run has no option --fast; see weft run --help\n");
+  EXPECT_EQ(told({"run", "drape", "fast"}),
+            "weft: weft run has no further argument fast; see weft run --help\n");
+  EXPECT_THAT(told({"export", "a.weft", "--format", "fbx", "-o", "a"}),
+              HasSubstr("\"fbx\" is none of csv, gltf, mdd, obj, pc2, usda, vtk"));
+}
+
 TEST_F(CommandsTest, AShellCompletesCommandsOptionsValuesAndSessions) {
   service_.create(small_scene(), "drape");
   setenv("WEFT_SERVER", address_.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)

@@ -136,6 +136,36 @@ TEST_F(LoadTest, FindsTheMostSessionsThatAServerHolds) {
   EXPECT_THAT(held, ::testing::ElementsAre(2, 4, 5));
 }
 
+TEST_F(LoadTest, StagesAddSessionsAndHaveFiguresOfTheirOwn) {
+  const auto result = ask({"load", "--scene", scene_file(small_scene()), "--stages", "1,3",
+                           "--rate", "100", "--ramp", "0.1", "--duration", "0.4"});
+  EXPECT_EQ(result["sessions_created"], 3);
+  const auto& stages = result["stages"];
+  ASSERT_EQ(stages.size(), 2U);
+  EXPECT_EQ(stages[0]["sessions"], 1);
+  EXPECT_EQ(stages[0]["create_s"]["count"], 1);
+  EXPECT_EQ(stages[1]["sessions"], 3);
+  EXPECT_EQ(stages[1]["create_s"]["count"], 2);
+  const auto frames = [](const auto& of) { return of["frame_s"]["count"].template get<int>(); };
+  EXPECT_NEAR(frames(stages[0]), 40, 5);
+  EXPECT_NEAR(frames(stages[1]), 120, 15);
+  EXPECT_EQ(frames(stages[0]) + frames(stages[1]), frames(result));
+}
+
+// A stage that the server cannot hold does not spoil the figures of the one before.
+TEST_F(LoadTest, WhatAStageIsRefusedCountsThere) {
+  ServerOptions options;
+  options.limits.max_sessions = 2;
+  const Service bounded(options);
+  const auto connection = client::Connection::to(bounded.server.address(), {});
+  client::LoadOrder order{.scene = small_scene(), .stages = {2, 3}};
+  order.ramp = milliseconds(50);
+  order.duration = milliseconds(50);
+  const client::LoadResult result = client::apply_load(*connection, order);
+  EXPECT_EQ(result.stages[0].errors, 0);
+  EXPECT_EQ(result.stages[1].errors, 1);
+}
+
 TEST_F(LoadTest, IsComparedWithAnEarlierOne) {
   const std::vector<std::string> load{"load",       "--scene", scene_file(small_scene()),
                                       "--sessions", "1",       "--ramp",
@@ -149,6 +179,10 @@ TEST_F(LoadTest, IsComparedWithAnEarlierOne) {
   const Outcome compared = with({"--against", path("earlier.json")});
   EXPECT_EQ(compared.exit, 0) << compared.err;
   EXPECT_THAT(compared.out, HasSubstr("frame p99"));
+  write_file(path("later.json"), with({"--json"}).out);
+  const Outcome files = run_weft({"load", "--compare", path("earlier.json"), path("later.json")});
+  EXPECT_EQ(files.exit, 0) << files.err;
+  EXPECT_THAT(files.out, HasSubstr("frame p99"));
   write_file(path("other.json"), R"({"frames": 3})");
   EXPECT_EQ(with({"--against", path("other.json")}).exit, 4);
 }
@@ -183,6 +217,10 @@ TEST_F(LoadTest, RefusesWhatMakesNoSense) {
   const Outcome too_fast = weft({"load", "--scene", scene, "--rate", "99999"});
   EXPECT_EQ(too_fast.exit, 2);
   EXPECT_THAT(too_fast.err, HasSubstr("times real time"));
+  for (const char* stages : {"0,2", "3,2", "2,2"})
+    EXPECT_EQ(weft({"load", "--scene", scene, "--stages", stages}).exit, 2) << stages;
+  EXPECT_EQ(weft({"load", "--scene", scene, "--stages", "1,2", "--find-limit"}).exit, 2);
+  EXPECT_EQ(weft({"load", "--scene", scene, "--stages", "1,2", "--frames", "3"}).exit, 2);
   EXPECT_EQ(weft({"load", "--scene", path("missing.json")}).exit, 4);
   v1::Scene bad = small_scene();
   bad.mutable_sheets(0)->mutable_grid()->set_rows(1);

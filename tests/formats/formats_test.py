@@ -1,17 +1,17 @@
-"""Whether the tools that exports are for read what the recording holds.
+"""Whether the tools that exports are for read what the recording holds: formats_test.py [CHECK...]
 
-BIN has the programs, NODE_MODULES gltf-validator. A line for each; exits with 1 where one is wrong.
+BIN has the programs. A CHECK is caches, vtk, gltf, usd or blender; none: all. A line for each; exits
+with 1 where one is wrong.
 """
 import csv
 import json
 import os
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree
-
-import vtk
 
 HERE = pathlib.Path(__file__).parent
 WEFT = pathlib.Path(os.environ["BIN"]) / "weft"
@@ -49,7 +49,47 @@ def largest(found, truth):
     return max(abs(a - b) for p, q in zip(found, truth) for a, b in zip(p, q))
 
 
+def check_caches(folder, recording, truth):
+    """OBJ, PC2 and MDD by what their formats say, of one sheet."""
+    (name, (rows, columns)), *_ = SHEETS.items()
+    count = rows * columns
+    part = [frame[:count] for frame in truth]
+    for kind in ("pc2", "mdd"):
+        weft("export", recording, f"--format={kind}", f"--sheet={name}",
+             "-o", folder / f"cache.{kind}")
+    weft("export", recording, "--format=obj", f"--sheet={name}", "-o", folder / "mesh")
+
+    def frames(numbers):
+        points = list(zip(numbers[0::3], numbers[1::3], numbers[2::3]))
+        return [points[first:first + count] for first in range(0, len(points), count)]
+
+    pc2 = (folder / "cache.pc2").read_bytes()
+    magic, version, points, _, _, samples = struct.unpack_from("<12s2i2fi", pc2)
+    assert (magic, version, points, samples) == (b"POINTCACHE2\0", 1, count, len(truth))
+    read = {"pc2": frames(struct.unpack_from(f"<{3 * points * samples}f", pc2, 32))}
+
+    mdd = (folder / "cache.mdd").read_bytes()
+    samples, points = struct.unpack_from(">2i", mdd)
+    assert (points, samples) == (count, len(truth))
+    times = struct.unpack_from(f">{samples}f", mdd, 8)
+    assert all(abs(time - frame / 60) < 1e-6 for frame, time in enumerate(times))
+    read["mdd"] = frames(struct.unpack_from(f">{3 * points * samples}f", mdd, 8 + 4 * samples))
+
+    read["obj"] = []
+    for file in sorted((folder / "mesh").glob("*.obj")):
+        lines = [line.split() for line in file.read_text().splitlines()]
+        read["obj"].append([tuple(map(float, line[1:4])) for line in lines if line[:1] == ["v"]])
+        faces = [[int(corner.split("/")[0]) for corner in line[1:]]
+                 for line in lines if line[:1] == ["f"]]
+        assert len(faces) == (rows - 1) * (columns - 1), f"{len(faces)} faces"
+        assert {corner for face in faces for corner in face} == set(range(1, count + 1))
+    off = {kind: max(map(largest, found, part)) for kind, found in read.items()}
+    assert all(len(found) == len(part) for found in read.values()), "not as many frames"
+    return [(kind, "its format", off[kind], FLOAT32) for kind in read]
+
+
 def check_vtk(folder, recording, truth):
+    import vtk
     weft("export", recording, "--format=vtk", "-o", folder / "a.pvd")
     entries = list(xml.etree.ElementTree.parse(folder / "a.pvd").iter("DataSet"))
     assert len(entries) == len(truth), f"{len(entries)} meshes"
@@ -120,25 +160,29 @@ def check_blender(folder, recording, truth):
     return [(what, f"Blender {version}", float(off), FLOAT32) for what, version, off in lines]
 
 
-def main():
+CHECKS = {"caches": check_caches, "vtk": check_vtk, "gltf": check_gltf, "usd": check_usd,
+          "blender": check_blender}
+
+
+def main(*wanted):
     wrong = 0
-    with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
+    with tempfile.TemporaryDirectory() as place:
+        folder = pathlib.Path(place)
         recording, truth = record(folder)
         particles = len(truth[0])
         print(f"{len(truth)} frames of {particles} particles, largest difference to the recording:")
-        for check in (check_vtk, check_gltf, check_usd, check_blender):
+        for name in wanted or CHECKS:
             try:
-                for what, reader, off, most in check(folder, recording, truth):
+                for what, reader, off, most in CHECKS[name](folder, recording, truth):
                     good = off <= most
                     wrong += not good
                     distance = f"{off:8.1e} m" if most else "     valid"
                     print(f"  {what:<17}  {reader:<30}  {distance}  {'ok' if good else 'WRONG'}")
             except (AssertionError, subprocess.CalledProcessError) as error:
                 wrong += 1
-                print(f"  {check.__name__[6:]:<17}  WRONG: {error}")
+                print(f"  {name:<17}  WRONG: {error}")
     return min(wrong, 1)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,385 @@
+#include "client/replay/replay_server.h"
+
+#include <fmt/format.h>
+#include <google/protobuf/util/time_util.h>
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+
+#include <chrono>
+#include <cstdint>
+#include <variant>
+
+#include "client/problem.h"
+#include "client/replay/player.h"
+#include "server/rpc/errors.h"
+#include "server/rpc/frame_encoding.h"
+#include "server/rpc/textile_service.h"
+#include "server/session/limits.h"
+#include "weft/v1/frame.grpc.pb.h"
+#include "weft/v1/server.grpc.pb.h"
+#include "weft/v1/session.grpc.pb.h"
+
+namespace weft::client {
+namespace {
+
+using grpc::ServerContext, grpc::Status;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kLook{200};           // for calls that were cancelled
+constexpr milliseconds kProgressDue{1'750};  // with kLook within two seconds
+
+}  // namespace
+
+// What all services know.
+class Replay {
+ public:
+  explicit Replay(const std::string& path) : player(path), path_(path) {}
+
+  Status find(const std::string& name) const {
+    return name == player.header().session() ? Status::OK : errors::session_not_found(name);
+  }
+  Status refuse() const {
+    return errors::failed_precondition(
+        "REPLAY", path_ + " is replayed: it can be run, paused, stepped and read, nothing else");
+  }
+  Status failed(const Player::Place& place) const {
+    return errors::solver_failed(place.failure, place.newest->number);
+  }
+  Status ended() const {
+    return errors::failed_precondition(
+        "RECORDING_ENDED", fmt::format("{} ends with frame {}", path_, player.last_frame()));
+  }
+  v1::Session session() const {
+    const Player::Place place = player.place();
+    v1::Session session;
+    session.set_name(player.header().session());
+    session.set_uid(player.header().uid());
+    *session.mutable_scene() = player.scene();
+    session.set_state(place.state);
+    session.set_frame(place.newest->number);
+    session.set_time_s(place.newest->time);
+    session.set_at_rest(place.newest->at_rest);
+    session.set_failure(place.failure);
+    session.set_numerics_id(player.header().numerics_id());
+    google::protobuf::util::TimeUtil::FromString(player.recorded_at(),
+                                                 session.mutable_create_time());
+    return session;
+  }
+
+  Player player;
+
+ private:
+  std::string path_;
+};
+
+class SessionReplay final : public v1::SessionService::Service {
+ public:
+  explicit SessionReplay(Replay& replay) : replay_(replay), player_(replay.player) {}
+
+  Status GetSession(ServerContext*, const v1::GetSessionRequest* request,
+                    v1::Session* response) override {
+    Status status = replay_.find(request->name());
+    if (status.ok()) *response = replay_.session();
+    return status;
+  }
+
+  Status ListSessions(ServerContext*, const v1::ListSessionsRequest*,
+                      v1::ListSessionsResponse* response) override {
+    *response->add_sessions() = replay_.session();
+    return Status::OK;
+  }
+
+  Status RunSession(ServerContext*, const v1::RunSessionRequest* request,
+                    v1::RunSessionResponse* response) override {
+    if (Status status = replay_.find(request->name()); !status.ok()) return status;
+    Player::Run run;
+    if (request->has_time_scale()) {
+      run.time_scale = request->time_scale();
+      if (!(*run.time_scale >= 1e-3 && *run.time_scale <= 1000)) {  // NaN too
+        return errors::field_invalid(
+            "time_scale", fmt::format("{} is not within 0.001 to 1000", *run.time_scale));
+      }
+    }
+    const std::int64_t newest = player_.place().newest->number;
+    if (request->has_until_frame()) {
+      run.until_frame = request->until_frame();
+      if (*run.until_frame <= newest) {
+        return errors::field_invalid(
+            "until_frame", fmt::format("does not lie ahead of the newest frame, {}", newest));
+      }
+    }
+    run.until_rest = request->until_rest();
+    const Player::Place place = player_.run(run);
+    if (place.state == v1::SESSION_STATE_FAILED) return replay_.failed(place);
+    if (place.state != v1::SESSION_STATE_RUNNING) return replay_.ended();
+    response->set_applied_frame(place.newest->number + 1);
+    return Status::OK;
+  }
+
+  Status PauseSession(ServerContext*, const v1::PauseSessionRequest* request,
+                      v1::PauseSessionResponse* response) override {
+    if (Status status = replay_.find(request->name()); !status.ok()) return status;
+    response->set_applied_frame(player_.pause().newest->number + 1);
+    return Status::OK;
+  }
+
+  Status StepSession(ServerContext*, const v1::StepSessionRequest* request,
+                     v1::StepSessionResponse* response) override {
+    if (Status status = replay_.find(request->name()); !status.ok()) return status;
+    const std::int64_t frames = request->has_frames() ? request->frames() : 1;
+    const std::int64_t newest = player_.place().newest->number;
+    if (frames < 1) return errors::field_invalid("frames", fmt::format("{} is below 1", frames));
+    if (request->has_expected_frame() && request->expected_frame() != newest) {
+      return errors::aborted("FRAME_STALE",
+                             fmt::format("expected_frame is not the newest frame, {}", newest),
+                             {{"latest_frame", std::to_string(newest)}});
+    }
+    if (frames > player_.last_frame() - newest) return replay_.ended();
+    const Player::Place place = player_.step(frames);
+    if (place.state == v1::SESSION_STATE_FAILED) return replay_.failed(place);
+    if (place.state == v1::SESSION_STATE_RUNNING) {
+      return errors::failed_precondition(
+          "SESSION_RUNNING", request->name() + " runs by itself; pause it before stepping");
+    }
+    response->set_applied_frame(newest + 1);
+    response->set_frame(place.newest->number);
+    response->set_time_s(place.newest->time);
+    response->set_at_rest(place.newest->at_rest);
+    return Status::OK;
+  }
+
+  Status CreateSession(ServerContext*, const v1::CreateSessionRequest*, v1::Session*) override {
+    return replay_.refuse();
+  }
+  Status DeleteSession(ServerContext*, const v1::DeleteSessionRequest*,
+                       v1::DeleteSessionResponse*) override {
+    return replay_.refuse();
+  }
+  Status UpdateTextile(ServerContext*, const v1::UpdateTextileRequest*,
+                       v1::UpdateTextileResponse*) override {
+    return replay_.refuse();
+  }
+  Status ApplyActions(ServerContext*, const v1::ApplyActionsRequest*,
+                      v1::ApplyActionsResponse*) override {
+    return replay_.refuse();
+  }
+  Status Interact(ServerContext*,
+                  grpc::ServerReaderWriter<v1::InteractResponse, v1::InteractRequest>*) override {
+    return replay_.refuse();
+  }
+
+ private:
+  Replay& replay_;
+  Player& player_;
+};
+
+class ServerReplay final : public v1::ServerService::Service {
+ public:
+  explicit ServerReplay(Replay& replay) : replay_(replay) {}
+
+  Status GetServerInfo(ServerContext*, const v1::GetServerInfoRequest*,
+                       v1::ServerInfo* response) override {
+    response->set_version(WEFT_VERSION);
+    response->set_numerics_id(replay_.player.header().numerics_id());
+    response->set_sessions(1);
+    response->mutable_limits()->set_max_frame_bytes(Limits().max_frame_bytes);
+    return Status::OK;
+  }
+  Status GetServerStats(ServerContext*, const v1::GetServerStatsRequest*,
+                        v1::ServerStats*) override {
+    return replay_.refuse();
+  }
+
+ private:
+  Replay& replay_;
+};
+
+class FrameReplay final : public v1::FrameService::Service {
+ public:
+  explicit FrameReplay(Replay& replay) : replay_(replay), player_(replay.player) {}
+
+  Status StreamFrames(ServerContext* context, const v1::StreamFramesRequest* request,
+                      grpc::ServerWriter<v1::StreamFramesResponse>* writer) override {
+    const auto header = open(*request, request->has_start_frame() ? request->start_frame()
+                                                                  : player_.place().newest->number);
+    if (const auto* error = std::get_if<Status>(&header)) return *error;
+    std::int64_t next = std::get<v1::StreamHeader>(header).start_frame();
+    if (request->has_end_frame() && request->end_frame() < next) {
+      return errors::field_invalid("end_frame", fmt::format("{} lies before the first frame, {}",
+                                                            request->end_frame(), next));
+    }
+    Writing<v1::StreamFramesResponse, decltype(*writer)> writing(
+        *this, *context, *writer, std::get<v1::StreamHeader>(header));
+    while (!request->has_end_frame() || next <= request->end_frame()) {
+      const auto place = writing.await(next);
+      if (const auto* error = std::get_if<Status>(&place)) return *error;
+      v1::StreamFramesResponse message;
+      if (Status status = fill(*message.mutable_frame(), next, request->format()); !status.ok())
+        return status;
+      writing.write(message);
+      ++next;
+    }
+    return Status::OK;
+  }
+
+  Status ViewFrames(
+      ServerContext* context,
+      grpc::ServerReaderWriter<v1::ViewFramesResponse, v1::ViewFramesRequest>* stream) override {
+    constexpr int kMostCredits = 64;
+    v1::ViewFramesRequest first, request;
+    if (!stream->Read(&first)) return Status::OK;
+    const auto header = open(first, player_.place().newest->number);
+    if (const auto* error = std::get_if<Status>(&header)) return *error;
+    std::int64_t next = std::get<v1::StreamHeader>(header).start_frame();
+    Writing<v1::ViewFramesResponse, decltype(*stream)> writing(*this, *context, *stream,
+                                                               std::get<v1::StreamHeader>(header));
+    request.set_credits(first.credits());
+    do {
+      if (request.credits() < 1 || request.credits() > kMostCredits) {
+        return errors::field_invalid(
+            "credits", fmt::format("{} is not within 1 to {}", request.credits(), kMostCredits));
+      }
+      for (int credit = 0; credit < request.credits(); ++credit) {
+        const auto place = writing.await(next);
+        if (const auto* error = std::get_if<Status>(&place)) return *error;
+        const std::int64_t newest = std::get<Player::Place>(place).newest->number;
+        v1::ViewFramesResponse message;
+        if (Status status = fill(*message.mutable_frame(), newest, first.format()); !status.ok())
+          return status;
+        message.set_skipped_count(newest - next);
+        writing.write(message);
+        next = newest + 1;
+      }
+    } while (stream->Read(&request));
+    return Status::OK;
+  }
+
+ private:
+  // What a call writes, frames apart.
+  template <class Response, class Writer>
+  class Writing {
+   public:
+    Writing(FrameReplay& frames, ServerContext& context, Writer writer,
+            const v1::StreamHeader& header)
+        : frames_(frames), context_(context), writer_(writer) {
+      Response message;
+      *message.mutable_header() = header;
+      write(message);
+      changes_ = frames_.player_.place().changes;
+    }
+
+    // Waits until the frame has come, and says meanwhile how things stand; or why it will not come.
+    std::variant<Player::Place, Status> await(std::int64_t next) {
+      for (;;) {
+        const Player::Place place = frames_.player_.wait(next, changes_, kLook);
+        if (context_.IsCancelled()) return errors::cancelled();
+        if (place.closed) return errors::server_draining();
+        if (place.newest->number >= next) return place;
+        if (place.state == v1::SESSION_STATE_FAILED) return frames_.replay_.failed(place);
+        if (place.changes == changes_ && Clock::now() - last_write_ < kProgressDue) continue;
+        changes_ = place.changes;
+        Response message;
+        v1::Progress* progress = message.mutable_progress();
+        progress->set_latest_frame(place.newest->number);
+        progress->set_oldest_frame(frames_.player_.first_frame());
+        progress->set_state(place.state);
+        progress->set_at_rest(place.newest->at_rest);
+        write(message);
+      }
+    }
+
+    void write(const Response& message) {
+      writer_.Write(message);
+      last_write_ = Clock::now();
+    }
+
+   private:
+    using Clock = std::chrono::steady_clock;
+
+    FrameReplay& frames_;
+    ServerContext& context_;
+    Writer writer_;
+    std::uint64_t changes_ = 0;
+    Clock::time_point last_write_;
+  };
+
+  // The header of a call that begins at a frame, or why there is none.
+  std::variant<v1::StreamHeader, Status> open(const auto& request, std::int64_t start) const {
+    if (Status status = replay_.find(request.session()); !status.ok()) return status;
+    v1::StreamHeader header = player_.header();
+    if (!request.uid().empty() && request.uid() != header.uid()) {
+      return errors::aborted("UID_CHANGED", "this name belongs to another session now",
+                             {{"uid", header.uid()}});
+    }
+    const auto newest = player_.place().newest;
+    auto problems =
+        find_problems(request.format(), static_cast<std::int64_t>(newest->positions.size()) / 3,
+                      Limits().max_frame_bytes);
+    if (request.format().velocities() && newest->velocities.empty())
+      problems.push_back({"format.velocities", "were not recorded; weft record --velocities does"});
+    if (!problems.empty()) return errors::field_invalid(problems);
+    if (start < player_.first_frame()) {
+      return errors::frame_expired(
+          start, {.oldest_frame = player_.first_frame(), .latest_frame = newest->number});
+    }
+    *header.mutable_format() = with_defaults(request.format());
+    header.set_start_frame(start);
+    return header;
+  }
+
+  Status fill(v1::Frame& message, std::int64_t number, const v1::FrameFormat& format) try {
+    message = to_proto(*player_.frame(number), with_defaults(format));
+    return Status::OK;
+  } catch (const Problem& problem) {
+    return errors::solver_failed(problem.what(), number - 1);
+  }
+
+  Replay& replay_;
+  Player& player_;
+};
+
+struct ReplayServer::Parts {
+  explicit Parts(const std::string& path) : replay(path) {}
+
+  Replay replay;
+  SessionReplay sessions{replay};
+  FrameReplay frames{replay};
+  ServerReplay servers{replay};
+  Access access{{}, false};
+  TextileService textiles{access};
+  std::unique_ptr<grpc::Server> grpc;
+};
+
+ReplayServer::ReplayServer(const std::string& path, const std::string& address, double time_scale)
+    : parts_(std::make_unique<Parts>(path)) {
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::ServerBuilder builder;
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  int port = 0;
+  builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &port);
+  builder.RegisterService(&parts_->sessions);
+  builder.RegisterService(&parts_->frames);
+  builder.RegisterService(&parts_->servers);
+  builder.RegisterService(&parts_->textiles);
+  parts_->grpc = builder.BuildAndStart();
+  if (!parts_->grpc || port == 0) {
+    throw Problem(
+        Exit::kRefused, "UNAVAILABLE", "ADDRESS_TAKEN",
+        fmt::format("cannot listen on {}; is weftd there? choose another --listen", address));
+  }
+  address_ = fmt::format("{}:{}", address.substr(0, address.rfind(':')), port);
+  parts_->grpc->GetHealthCheckService()->SetServingStatus("", true);
+  if (time_scale > 0) parts_->replay.player.run({.time_scale = time_scale});
+}
+
+ReplayServer::~ReplayServer() {
+  parts_->replay.player.close();
+  parts_->grpc->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(2));
+}
+
+std::string ReplayServer::session() const { return parts_->replay.player.header().session(); }
+std::int64_t ReplayServer::first_frame() const { return parts_->replay.player.first_frame(); }
+std::int64_t ReplayServer::last_frame() const { return parts_->replay.player.last_frame(); }
+
+}  // namespace weft::client

@@ -1,0 +1,35 @@
+#include <gmock/gmock.h>
+
+#include <filesystem>
+
+#include "tests/client/client_test.h"
+
+namespace weft::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+using DemoTest = ClientTest;
+
+TEST_F(DemoTest, EndsWithTheExperimentsTheSpeedOfEachLawAndOnePageOfAll) {
+  const auto result = ask({"demo", "--longest", "0.2", "-o", path("demo")});
+  EXPECT_EQ(result["runs"].size(), 11U);
+  const auto& speed = result["speed"];
+  ASSERT_EQ(speed.size(), 5U);
+  EXPECT_EQ(speed[0]["bending"], "series");
+  EXPECT_EQ(speed[0]["times_series"], 1);
+  EXPECT_EQ(speed[1]["bending"], "exact");
+  EXPECT_EQ(speed[1]["rms_from_exact_m"], 0);
+  for (std::size_t law = 2; law < speed.size(); ++law) {
+    EXPECT_GT(speed[law]["times_series"], 1);
+    EXPECT_GT(speed[law]["rms_from_exact_m"], 0);
+  }
+  const std::string page = read_file(result["page"].get<std::string>());
+  EXPECT_THAT(page, HasSubstr(R"("title":"Speed")"));
+  EXPECT_THAT(page, HasSubstr(R"({"group":"Measured","rows":[["time",)"));
+  EXPECT_THAT(page, HasSubstr(R"(["against series","1.00 x"])"));
+  EXPECT_TRUE(std::filesystem::exists(path("demo/paper-4-exact.pc2")));
+}
+
+}  // namespace
+}  // namespace weft::testing

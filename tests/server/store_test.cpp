@@ -312,6 +312,31 @@ TEST_F(Restart, LosesOnlyTheSessionThatIsDamaged) {
   EXPECT_EQ(service_->step(good).frame(), 7);
 }
 
+TEST_F(Restart, NeverMistakesADamagedCallForASoundOne) {
+  constexpr double kBend = 1.2345e-5;
+  const v1::Session session = service_->create(small_scene(), "curtain");
+  v1::UpdateTextileRequest update;
+  update.set_name(session.name());
+  update.mutable_update_mask()->add_paths("raw.bend_n_m2");
+  update.mutable_textile()->mutable_raw()->set_bend_n_m2(kBend);
+  ASSERT_EQ(service_->error(&Sessions::UpdateTextile, update).code, grpc::StatusCode::OK);
+  service_.reset();
+  const std::string good = content(file());
+  const std::string value(reinterpret_cast<const char*>(&kBend), sizeof kBend);
+  const auto place = good.find(value);
+  ASSERT_NE(place, std::string::npos);
+  for (std::size_t byte = 0; byte < value.size(); ++byte) {
+    std::string bytes = good;
+    bytes[place + byte] = static_cast<char>(bytes[place + byte] ^ 1);
+    std::ofstream(file(), std::ios::binary) << bytes;
+    start();
+    v1::GetSessionRequest get;
+    get.set_name(session.name());
+    EXPECT_EQ(service_->error(&Sessions::GetSession, get).code, grpc::StatusCode::DATA_LOSS);
+    service_.reset();
+  }
+}
+
 // Whatever byte is changed: the server refuses the file, or has the session as it was, or says that
 // it is damaged.
 TEST_F(Restart, NeverMistakesDamageForASession) {

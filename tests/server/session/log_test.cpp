@@ -39,6 +39,20 @@ struct Disk {
     std::lock_guard lock(mutex);
     error = why;
   }
+  std::int64_t begun() {  // waits for a write; how far frames may go once it has finished
+    for (;;) {
+      std::lock_guard lock(mutex);
+      if (!waiting.empty()) return reach.frame;
+    }
+  }
+  void hurry() {
+    {
+      std::lock_guard lock(mutex);
+      slow = false;
+      if (waiting.empty()) return;
+    }
+    finish();
+  }
   void finish() {  // waits for one
     std::function<void()> write;
     while (!write) {
@@ -196,6 +210,22 @@ TEST_F(SessionLogTest, SaysHowFarFramesGoBeforeTheyArePublished) {
     ASSERT_LE(frame, disk_->past().reach.frame);
   }
   EXPECT_EQ(disk_->past().reach.frame, 3000);
+}
+
+TEST_F(SessionLogTest, StandsStillWhereTheDiskDoesNotYetSayHowFarFramesGo) {
+  const auto session = make(disk_), other = make(std::make_shared<Disk>());
+  disk_->slow = true;
+  auto running = run(*session, 3000);
+  const std::int64_t reach = disk_->begun();
+  ASSERT_LT(reach, 3000);
+  disk_->finish();
+  running.applied();
+  step(*other, 1000).applied();  // takes its time
+  EXPECT_LE(session->status().newest->number, reach);
+  disk_->hurry();
+  const auto watcher = Watcher::of(*session, 0);
+  while (watcher->read().frame->number < 3000) {
+  }
 }
 
 TEST_F(SessionLogTest, GivesTheSameFramesAgain) {

@@ -90,7 +90,7 @@ std::string speed_text(const std::vector<Law>& laws, const Law& law) {
   return fmt::format("{:.2f} x", laws.front().wall_s / law.wall_s);
 }
 
-std::string rms_text(const Law& law) { return number_text(1e3 * law.rms_m) + " mm"; }
+std::string rms_text(const Law& law) { return fmt::format("{:.3g} um", 1e6 * law.rms_m); }
 
 // The paper's figures, from the recordings of the runs.
 PageOrder plan_page(const DemoOptions& options, const std::vector<Law>& laws) {

@@ -1,12 +1,16 @@
 // Prints what tinyusdz reads of USD files: the mesh of each at its first frame.
-import {readFileSync} from 'node:fs';
+import {copyFileSync, mkdtempSync, readFileSync, rmSync} from 'node:fs';
+import {tmpdir} from 'node:os';
 import {dirname, join} from 'node:path';
 import {fileURLToPath} from 'node:url';
 
 const library = join(dirname(fileURLToPath(import.meta.url)), 'node_modules', 'tinyusdz');
 globalThis.window = globalThis;  // it takes itself to be in a browser
 process.type = 'renderer';
-const {default: load} = await import(join(library, 'tinyusdz.js'));
+const folder = mkdtempSync(join(tmpdir(), 'weft-usd-'));
+copyFileSync(join(library, 'tinyusdz.js'), join(folder, 'tinyusdz.mjs'));  // a module, but Node 18 goes by the name
+const {default: load} = await import(join(folder, 'tinyusdz.mjs'));
+rmSync(folder, {recursive: true});
 const tinyusdz = await load({wasmBinary: readFileSync(join(library, 'tinyusdz.wasm'))});
 
 const meshes = process.argv.slice(2).map((path) => {

@@ -69,6 +69,7 @@ Usage Weftd::usage() const {
   const std::filesystem::path proc = fmt::format("/proc/{}", process_->id());
   const std::string status = text_of(proc / "status");
   const std::string stat = text_of(proc / "stat");
+  const std::string io = text_of(proc / "io");  // empty where the kernel keeps no account
   std::istringstream fields(stat.substr(stat.rfind(')') + 2));
   const std::vector<std::string> words{std::istream_iterator<std::string>(fields), {}};
   const double user_ticks = std::stod(words.at(11)), kernel_ticks = std::stod(words.at(12));
@@ -76,7 +77,7 @@ Usage Weftd::usage() const {
   return {.cpu_s = (user_ticks + kernel_ticks) / static_cast<double>(sysconf(_SC_CLK_TCK)),
           .memory = 1024 * number_behind(status, "VmRSS:"),
           .most_memory = 1024 * number_behind(status, "VmHWM:"),
-          .stored = number_behind(text_of(proc / "io"), "\nwrite_bytes:"),
+          .stored = io.empty() ? 0 : number_behind(io, "\nwrite_bytes:"),
           .threads = static_cast<int>(number_behind(status, "Threads:")),
           .files = static_cast<int>(std::distance(begin(files), end(files)))};
 }

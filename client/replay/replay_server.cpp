@@ -164,6 +164,16 @@ class SessionReplay final : public v1::SessionService::Service {
                       v1::ApplyActionsResponse*) override {
     return replay_.refuse();
   }
+  Status CreateSnapshot(ServerContext*, const v1::CreateSnapshotRequest*, v1::Snapshot*) override {
+    return replay_.refuse();
+  }
+  Status ListSnapshots(ServerContext*, const v1::ListSnapshotsRequest* request,
+                       v1::ListSnapshotsResponse*) override {
+    return replay_.find(request->parent());  // there are none
+  }
+  Status RestoreSession(ServerContext*, const v1::RestoreSessionRequest*, v1::Session*) override {
+    return replay_.refuse();
+  }
   Status Interact(ServerContext*,
                   grpc::ServerReaderWriter<v1::InteractResponse, v1::InteractRequest>*) override {
     return replay_.refuse();

@@ -101,6 +101,9 @@ TEST_F(ReplayTest, WhatWouldChangeItIsRefusedInOneSentence) {
   EXPECT_EQ(refusal({"session", "delete", id_}), "REPLAY");
   EXPECT_EQ(refusal({"textile", "set", id_, "--preset", "denim_11oz"}), "REPLAY");
   EXPECT_EQ(refusal({"act", "release", id_, "0,0"}), "REPLAY");
+  EXPECT_EQ(refusal({"session", "snapshot", id_}), "REPLAY");
+  EXPECT_EQ(refusal({"session", "restore", id_, "frame-0"}), "REPLAY");
+  EXPECT_EQ(ask_replay({"session", "snapshots", id_}).exit, 0);
   EXPECT_EQ(refusal({"session", "get", "other"}), "SESSION_NOT_FOUND");
   EXPECT_EQ(refusal({"record", id_, "--velocities", "-o", path("velocities.weft")}),
             "FIELD_INVALID");

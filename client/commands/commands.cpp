@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "client/output/text.h"
+#include "server/config.h"
 
 namespace weft::client {
 namespace {
@@ -73,8 +74,7 @@ std::pair<std::string, std::uint16_t> read_address(const char* option, const std
     throw usage_problem(fmt::format("{} {}: write HOST:PORT", option, text));
   std::string host = text.substr(0, colon);
   if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
-  const bool loopback = host == "localhost" || host == "::1" || host.starts_with("127.");
-  if (!loopback && !insecure) {
+  if (!is_loopback(host) && host != "::1" && !insecure) {
     throw usage_problem(
         fmt::format("{} is {}, which other machines can reach, and nothing is encrypted; add "
                     "--insecure if that is what you want",

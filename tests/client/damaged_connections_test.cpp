@@ -52,22 +52,6 @@ class DamagedConnections : public ClientTest {
   asio::io_context io_;
 };
 
-// One bit flipped, cut short, or with a byte more.
-std::string damaged(std::string bytes, std::mt19937& random) {
-  const std::size_t place = random() % bytes.size();
-  switch (random() % 3) {
-    case 0:
-      bytes[place] = static_cast<char>(bytes[place] ^ (1 << random() % 8));
-      break;
-    case 1:
-      bytes.resize(place);
-      break;
-    default:
-      bytes.insert(place, 1, static_cast<char>(random()));
-  }
-  return bytes;
-}
-
 TEST_F(DamagedConnections, LeaveTheServerServingAndOthersWithEveryFrame) {
   constexpr int kConnections = 300;
   const std::vector<std::string> sound = conversations();

@@ -621,18 +621,7 @@ TEST(BadRequests, OfDamagedBytesAreRefusedOrReadAsTheyAre) {
     for (int round = 0; round < kRounds; ++round) {
       std::string bytes = requests[random() % requests.size()]->SerializeAsString();
       if (bytes.empty()) bytes = "x";
-      const std::size_t place = random() % bytes.size();
-      switch (random() % 3) {
-        case 0:
-          bytes[place] = static_cast<char>(bytes[place] ^ (1 << random() % 8));
-          break;
-        case 1:
-          bytes.resize(place);
-          break;
-        default:
-          bytes.insert(place, 1, static_cast<char>(random()));
-      }
-      const auto [accepted, error] = subject.ask(*method, bytes);
+      const auto [accepted, error] = subject.ask(*method, damaged(std::move(bytes), random));
       if (!accepted) expect_explained(error, false);
     }
   }

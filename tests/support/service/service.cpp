@@ -219,6 +219,21 @@ std::pair<std::string, Error> raw_call(Service& service, const std::string& meth
   return {std::string(bytes.begin(), bytes.end()), Error(status)};
 }
 
+std::string damaged(std::string bytes, std::mt19937& random) {
+  const std::size_t place = random() % bytes.size();
+  switch (random() % 3) {
+    case 0:
+      bytes[place] = static_cast<char>(bytes[place] ^ (1 << random() % 8));
+      break;
+    case 1:
+      bytes.resize(place);
+      break;
+    default:
+      bytes.insert(place, 1, static_cast<char>(random()));
+  }
+  return bytes;
+}
+
 std::string metrics_at(const std::string& address) {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in to{};

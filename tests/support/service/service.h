@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -103,6 +104,9 @@ class Stream {
 std::pair<std::string, Error> raw_call(Service& service, const std::string& method,
                                        const std::string& request, bool streams = false,
                                        const std::string& token = {});
+
+// The bytes with one bit flipped, cut short, or with a byte more. Precondition: not empty.
+std::string damaged(std::string bytes, std::mt19937& random);
 
 // Every method of the interface, from its descriptors.
 std::vector<const google::protobuf::MethodDescriptor*> all_methods();

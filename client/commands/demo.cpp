@@ -260,6 +260,7 @@ std::string table_text(const std::vector<Run>& runs, const std::vector<Law>& law
   Table speed({"BENDING", "WALL", "AGAINST SERIES", "RMS FROM EXACT"});
   for (const Law& law : laws)
     speed.add({law.name, seconds_text(law.wall_s), speed_text(laws, law), rms_text(law)});
+  const RecordingReader series(laws.front().path);
   return fmt::format(
       "{}\n{}\nBENDING: {:g} s of experiment 1, the whole simulation, the best of three. The "
       "paper\n"
@@ -269,9 +270,7 @@ std::string table_text(const std::vector<Run>& runs, const std::vector<Law>& law
       "-end, the last one as OBJ. STRAIN: the largest. AT REST: the energy.\n"
       "The paper's figures 4 to 7, to be played and turned in a browser:\n  {}\n",
       table.text(), speed.text(),
-      RecordingReader(laws.front().path).header().frame_step_s() *
-          static_cast<double>(RecordingReader(laws.front().path).last_frame()),
-      directory, page);
+      series.header().frame_step_s() * static_cast<double>(series.last_frame()), directory, page);
 }
 
 Json runs_json(const std::vector<Run>& runs, const std::vector<Law>& laws,

@@ -82,9 +82,8 @@ void fill(FuzzedDataProvider& input, Message& message, int depth) {
 
 std::string some_request(FuzzedDataProvider& input, const google::protobuf::Descriptor& type) {
   if (input.ConsumeIntegralInRange(0, 7) == 7) return input.ConsumeRemainingBytesAsString();
-  const auto* factory = google::protobuf::MessageFactory::generated_factory();
-  const std::unique_ptr<Message> request(
-      const_cast<google::protobuf::MessageFactory*>(factory)->GetPrototype(&type)->New());
+  auto* factory = google::protobuf::MessageFactory::generated_factory();
+  const std::unique_ptr<Message> request(factory->GetPrototype(&type)->New());
   fill(input, *request, 0);
   return request->SerializeAsString();
 }

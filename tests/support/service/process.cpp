@@ -13,7 +13,7 @@ namespace weft::testing {
 Process::Process(const std::string& program, const std::vector<std::string>& arguments,
                  const std::string& output, std::size_t file_size_limit,
                  std::vector<std::string> environment) {
-  std::string path = std::string(WEFT_BIN_DIR) + '/' + program;
+  std::string path = program.starts_with('/') ? program : std::string(WEFT_BIN_DIR) + '/' + program;
   std::vector<std::string> words = arguments;
   words.insert(words.begin(), path);
   std::vector<char*> argv;

@@ -7,7 +7,7 @@
 
 namespace weft::testing {
 
-// One of the programs that were built, running.
+// A program, running: one of those that were built, or one named by its whole path.
 class Process {
  public:
   // What it writes goes to the file `output`. A limit of 0 bytes for files it writes: none. It has

@@ -75,6 +75,11 @@ std::vector<Text> texts(Config& config, TlsOptions& tls) {
       {"metrics", &server.metrics, "ADDRESS",
        "Address and port to serve Prometheus' metrics at, or none"},
       {"data_dir", &server.data_dir, "DIR", "Directory that keeps sessions, or none"},
+      {"database", &server.database, "URL",
+       "PostgreSQL database that several servers share sessions in, or none; a password is better "
+       "in $WEFT_DATABASE or PGPASSFILE than here"},
+      {"replica", &server.replica, "NAME",
+       "What the others and the load balancer call this server [the host's name]"},
       {"tls_cert", &tls.certificate, "FILE", "Certificate chain (PEM): encrypts, needs --tls-key"},
       {"tls_key", &tls.key, "FILE", "Its key (PEM, no passphrase)"},
       {"tls_client_ca", &tls.client_ca, "FILE",
@@ -82,6 +87,12 @@ std::vector<Text> texts(Config& config, TlsOptions& tls) {
       {"tokens", &server.tokens, "FILE",
        "Who may call: lines PRINCIPAL SHA256 [admin], as weft token writes them"},
   };
+}
+
+// What a load balancer's configuration can spell.
+bool is_replica(const std::string& name) {
+  return !name.empty() && name.size() <= 63 &&
+         name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos;
 }
 
 std::string flag_of(const char* key) {
@@ -160,6 +171,15 @@ std::string default_data_dir() {
   if (const auto state = variable("XDG_STATE_HOME"); !state.empty()) return state + "/weft";
   if (const auto home = variable("HOME"); !home.empty()) return home + "/.local/state/weft";
   return "/var/lib/weft";
+}
+
+void set_database(ServerOptions& server) {
+  const char* variable = std::getenv("WEFT_DATABASE");
+  if (!server.database && variable != nullptr) server.database = variable;
+  if (server.database && (server.database->empty() || *server.database == "none"))
+    server.database.reset();
+  if (server.replica && !is_replica(*server.replica))
+    refuse("replica is \"" + *server.replica + "\", not 1 to 63 characters of a-z, 0-9 and -");
 }
 
 void check_reach(const std::string& key, const std::string& value, const std::string& host,
@@ -258,6 +278,7 @@ Config read_config(int argc, const char* const* argv) {
   if (config.server.metrics) check_metrics(config);
   if (config.server.data_dir->empty()) refuse("data_dir is empty; give a directory, or none");
   if (*config.server.data_dir == "none") config.server.data_dir.reset();
+  set_database(config.server);
   if (app.count("--log-level") > 0) set_log_level(config, log_level, "--log-level");
   if (!config.insecure && !config.server.tls)
     check_reach("host", *config.server.host, *config.server.host, "give --tls-cert, or add");

@@ -2,11 +2,13 @@
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <unistd.h>
 
 #include <array>
 #include <stdexcept>
 
 #include "server/rpc/backend.h"
+#include "server/rpc/find.h"
 #include "server/rpc/frame_service.h"
 #include "server/rpc/lab_service.h"
 #include "server/rpc/metrics.h"
@@ -50,13 +52,29 @@ void enable_plugins() {
   static_cast<void>(once);
 }
 
+std::string replica_of(const ServerOptions& options) {
+  if (options.replica) return *options.replica;
+  std::array<char, 64> name{};
+  gethostname(name.data(), name.size() - 1);
+  for (char& c : name) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+    if (c != '\0' && !((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'))) c = '-';
+  }
+  return name.data();
+}
+
+std::unique_ptr<SessionStore> open_store(const ServerOptions& options) {
+  if (options.database) return open_postgres_store(*options.database, replica_of(options));
+  return options.data_dir ? open_sqlite_store(*options.data_dir) : make_no_store();
+}
+
 }  // namespace
 
 struct Server::Parts {
   explicit Parts(const ServerOptions& options)
       : backend(options.limits, options.worker_threads,
-                std::chrono::milliseconds(options.snapshot_ms),
-                options.data_dir ? open_sqlite_store(*options.data_dir) : make_no_store(),
+                std::chrono::milliseconds(options.snapshot_ms), open_store(options),
+                options.database ? replica_of(options) : "",
                 Access(options.tokens, options.tls && options.tls->client_ca)) {}
 
   Backend backend;
@@ -93,6 +111,12 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
   }
   if (options.host) address_ = *options.host + ":" + std::to_string(port);
   if (options.metrics) parts_->metrics.emplace(parts_->backend, *options.metrics);
+  parts_->backend.store->watch(
+      {[backend = &parts_->backend](const std::string& uid) {
+         if (const auto session = backend->registry.find_uid(uid))
+           backend->registry.erase(session, Refusal::Why::kTaken);
+       },
+       [backend = &parts_->backend](const std::string& id) { adopt_session(*backend, id); }});
   for (const char* service : kServices) {
     parts_->grpc->GetHealthCheckService()->SetServingStatus(service, true);
   }
@@ -100,7 +124,8 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
 
 Server::~Server() {
   stop();
-  parts_->backend.planner.stop();    // the scene it is at still needs the services
+  parts_->backend.planner.stop();  // the scene it is at still needs the services
+  parts_->backend.store_calls.stop();
   parts_->backend.scheduler.stop();  // and sessions the store
 }
 
@@ -133,7 +158,10 @@ void Server::stop(std::chrono::milliseconds deadline) {
   parts_->frames.drain();
   parts_->backend.registry.close(Refusal::Why::kDraining);
   parts_->sessions.drain();
+  parts_->backend.planner.drain();
+  parts_->backend.store_calls.drain();
   parts_->lab.drain();
+  parts_->backend.store->leave();
   const bool ended = parts_->backend.calls.wait_for_none(end);
   parts_->grpc->Shutdown(std::chrono::system_clock::now() + (ended ? kGrace : kNoGrace));
 }

@@ -19,6 +19,8 @@ struct ServerOptions {
   int worker_threads = static_cast<int>(std::thread::hardware_concurrency());
   std::optional<std::string> metrics;   // "127.0.0.1:9464"; absent: none
   std::optional<std::string> data_dir;  // where sessions are kept; absent: they end with the server
+  std::optional<std::string> database;  // of PostgreSQL, which several servers share; instead
+  std::optional<std::string> replica;   // what those call this one; absent: the host's name
   std::optional<ServerTls> tls;         // absent: unencrypted
   std::optional<std::string> tokens;    // file of Access; absent: nobody needs one
   int snapshot_ms = 2000;               // SessionHost::snapshot_after

@@ -6,11 +6,14 @@
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <mutex>
+#include <string>
 #include <utility>
 
 #include "server/rpc/access.h"
 #include "server/rpc/open_calls.h"
 #include "server/rpc/requests.h"
+#include "server/rpc/slow_calls.h"
 #include "server/session/limits.h"
 #include "server/session/registry.h"
 #include "server/session/scheduler.h"
@@ -24,11 +27,14 @@ struct StreamCaller {
   Quota::Share share;
 };
 
+// Sessions go on for so long while a database that servers share is away.
+inline constexpr std::chrono::seconds kSharedReachTime{2};
+
 // What the services share. The registry goes first, while sessions can still reach the scheduler.
 // Scenes are planned on a thread of their own, so that a large one holds up no session.
 struct Backend {
   Backend(const Limits& given, int threads, std::chrono::milliseconds snapshots_after,
-          std::unique_ptr<SessionStore> sessions, Access callers)
+          std::unique_ptr<SessionStore> sessions, std::string name, Access callers)
       : limits(given),
         worker_threads(threads),
         snapshot_after(snapshots_after),
@@ -37,6 +43,7 @@ struct Backend {
                 {"streams_per_principal", given.max_streams_per_principal}),
         scheduler(threads),
         store(std::move(sessions)),
+        replica(std::move(name)),
         registry(given) {}
 
   SessionHost host() {
@@ -45,7 +52,8 @@ struct Backend {
             static_cast<std::size_t>(limits.history_bytes_per_session),
             [](const std::string& line) { spdlog::warn(line); },
             snapshot_after,
-            static_cast<std::size_t>(limits.max_snapshots_per_session)};
+            static_cast<std::size_t>(limits.max_snapshots_per_session),
+            store->is_shared() ? kSharedReachTime : SessionHost::kReachTime};
   }
 
   // The caller of a stream, or why there is none.
@@ -61,8 +69,11 @@ struct Backend {
   Requests requests;
   Stats stats;
   Scheduler scheduler;
-  Scheduler planner{1};
+  SlowCalls planner{"creations", "too many sessions are being created"};
+  SlowCalls store_calls{"store_calls", "too many calls wait for the store"};
+  std::mutex claiming;
   const std::unique_ptr<SessionStore> store;
+  const std::string replica;  // among servers that share the store; else empty
   Registry registry;
 };
 

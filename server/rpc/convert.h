@@ -42,6 +42,8 @@ enum class StartValues { kIncluded, kLeftOut };
 
 // With every default filled in.
 v1::Session to_proto(const Session& session, StartValues start_values = StartValues::kIncluded);
+// One that another server has: what never changes of it.
+v1::Session to_proto(const SessionIdentity& identity, const Scene& scene);
 v1::Snapshot to_proto(const Session& session, const NamedSnapshot& snapshot);
 v1::Textile to_proto(const Textile& textile);
 

@@ -170,11 +170,29 @@ google::protobuf::Timestamp timestamp_of(std::chrono::system_clock::time_point t
       std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count());
 }
 
+namespace {
+
+v1::Session session_of(const SessionIdentity& identity) {
+  v1::Session result;
+  result.set_name(session_name(identity.id));
+  result.set_uid(identity.uid);
+  result.set_numerics_id(identity.numerics_id);
+  result.set_owner(identity.owner);
+  *result.mutable_create_time() = timestamp_of(identity.create_time);
+  return result;
+}
+
+}  // namespace
+
+v1::Session to_proto(const SessionIdentity& identity, const Scene& scene) {
+  v1::Session result = session_of(identity);
+  set(result.mutable_scene(), scene, textiles_of(scene), StartValues::kLeftOut);
+  return result;
+}
+
 v1::Session to_proto(const Session& session, StartValues start_values) {
   const SessionStatus status = session.status();
-  v1::Session result;
-  result.set_name(session_name(session.id()));
-  result.set_uid(session.uid());
+  v1::Session result = session_of(session.identity());
   set(result.mutable_scene(), session.scene(), status.textiles, start_values);
   result.set_state(to_proto(status.state));
   result.set_frame(status.newest->number);
@@ -183,10 +201,7 @@ v1::Session to_proto(const Session& session, StartValues start_values) {
   *result.mutable_plan() = to_proto(*status.plan);
   result.set_failure(status.failure);
   result.set_lateness_s(status.lateness.count());
-  result.set_numerics_id(session.numerics_id());
-  result.set_owner(session.owner());
   for (const auto& repair : status.repairs) *result.add_repairs() = to_proto(repair);
-  *result.mutable_create_time() = timestamp_of(session.create_time());
   return result;
 }
 
@@ -219,8 +234,7 @@ v1::Textile as_given(const Textile& textile) {
 }
 
 v1::Scene as_given(const Scene& scene) {
-  std::vector<Textile> textiles;
-  for (const auto& sheet : scene.sheets) textiles.push_back(sheet.textile);
+  const std::vector<Textile> textiles = textiles_of(scene);
   v1::Scene given;
   set(&given, scene, textiles, StartValues::kIncluded);
   for (int i = 0; i < given.sheets_size(); ++i) {

@@ -1,9 +1,10 @@
 #include <algorithm>
-#include <new>
+#include <mutex>
 #include <utility>
 
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
+#include "server/rpc/find.h"
 #include "server/rpc/names.h"
 #include "server/rpc/server_service.h"
 #include "server/rpc/session_service.h"
@@ -53,43 +54,6 @@ grpc::Status refused(const Registry::Refused& refused, const Caller& caller,
 
 }  // namespace
 
-// A call whose scene is being planned; answered once, by the planner or by a server that goes down.
-class SessionService::Creation {
- public:
-  Creation(v1::Session* response, grpc::ServerUnaryReactor* reactor)
-      : response_(response), reactor_(reactor) {}
-
-  void answer(const grpc::Status& status, v1::Session session = {}) {
-    std::lock_guard lock(mutex_);
-    if (reactor_ == nullptr) return;
-    *response_ = std::move(session);
-    std::exchange(reactor_, nullptr)->Finish(status);
-  }
-
- private:
-  std::mutex mutex_;
-  v1::Session* response_;
-  grpc::ServerUnaryReactor* reactor_;  // null: answered
-};
-
-// False where the server goes down.
-bool SessionService::begin(const std::shared_ptr<Creation>& creation) {
-  std::lock_guard lock(mutex_);
-  if (!backend_.draining) creations_.insert(creation);
-  return !backend_.draining;
-}
-
-void SessionService::end(const std::shared_ptr<Creation>& creation) {
-  std::lock_guard lock(mutex_);
-  creations_.erase(creation);
-}
-
-void SessionService::drain() {
-  interactions_.drain();
-  std::lock_guard lock(mutex_);
-  for (const auto& creation : creations_) creation->answer(errors::server_draining());
-}
-
 grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
                                                         const v1::CreateSessionRequest* request,
                                                         v1::Session* response) {
@@ -97,10 +61,11 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
   if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
   const auto& who = std::get<Caller>(caller);
   // what a full server refuses does not wait for the plans of others
-  return create_later(refusal(who, *request, request->session_id()), response,
-                      [this, who, request = *request](v1::Session& session) {
-                        return create(who, request, session);
-                      });
+  const auto status = refusal(who, *request, request->session_id());
+  if (!status.ok()) return answer(context, status);
+  return create_later(response, [this, who, request = *request](v1::Session& session) {
+    return create(who, request, session);
+  });
 }
 
 grpc::ServerUnaryReactor* SessionService::RestoreSession(grpc::CallbackServerContext* context,
@@ -108,38 +73,32 @@ grpc::ServerUnaryReactor* SessionService::RestoreSession(grpc::CallbackServerCon
                                                          v1::Session* response) {
   const auto caller = backend_.access.caller(*context);
   if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
-  return create_later(grpc::Status::OK, response,
-                      [this, who = std::get<Caller>(caller), request = *request](
-                          v1::Session& session) { return restore(who, request, session); });
+  return create_later(
+      response, [this, who = std::get<Caller>(caller), request = *request](v1::Session& session) {
+        return restore(who, request, session);
+      });
 }
 
 // Planning a scene takes its time: not on a thread of gRPC's. `make` has copies of what it needs:
 // it may outlive the call.
-grpc::ServerUnaryReactor* SessionService::create_later(grpc::Status status, v1::Session* response,
-                                                       Make make) {
-  auto* reactor = new UnaryCall(backend_.calls);
-  const auto creation = std::make_shared<Creation>(response, reactor);
-  if (status.ok() && !begin(creation)) status = errors::server_draining();
-  if (!status.ok()) {
-    creation->answer(status);
-    return reactor;
-  }
-  const bool posted = backend_.planner.post([this, creation, make = std::move(make)] {
-    try {
-      v1::Session session;
-      const grpc::Status made = make(session);
-      creation->answer(made, std::move(session));
-    } catch (const std::bad_alloc&) {
-      creation->answer(
-          errors::exhausted("memory", "the server has no memory for this scene", true));
-    }
-    end(creation);
-  });
-  if (!posted) {
-    end(creation);
-    creation->answer(errors::exhausted("creations", "too many sessions are being created", true));
-  }
-  return reactor;
+grpc::ServerUnaryReactor* SessionService::create_later(v1::Session* response, Make make) {
+  auto* call = new UnaryCall(backend_.calls);
+  const auto session = std::make_shared<v1::Session>();
+  backend_.planner.ask(
+      [this, session, make = std::move(make)] {
+        try {
+          const grpc::Status status = make(*session);
+          if (!session->name().empty()) session->set_replica(backend_.replica);
+          return status;
+        } catch (const StoreError& error) {
+          return errors::store_unreachable(error.what());
+        }
+      },
+      [call, response, session](const grpc::Status& status) {
+        if (status.ok()) response->Swap(session.get());
+        call->Finish(status);
+      });
+  return call;
 }
 
 // Whether the session, or what the request made before, could be had; its scene is not looked at.
@@ -166,11 +125,10 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
   const auto named = named_request(caller, request, request.request_id());
   if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
   const Request& name = std::get<Request>(named);
-  const auto known = backend_.requests.find(name);
+  const auto known = carried_out(name);
   if (const auto* error = std::get_if<grpc::Status>(&known)) return *error;
-  if (const auto& uid = std::get<std::optional<std::string>>(known)) {
-    return created_before(*uid, response);
-  }
+  if (const auto& creation = std::get<std::optional<CarriedOut>>(known))
+    return created_before(caller, *creation, response);
 
   // everything that is wrong with the scene, and its size, before anything is made of it
   auto converted = to_scene(request.session().scene(), "session.scene");
@@ -203,17 +161,22 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
     response.clear_owner();
     return grpc::Status::OK;
   }
+  return keep(session, caller, name, nullptr);
+}
+
+// Adds a new session to the store and the registry.
+grpc::Status SessionService::keep(const std::shared_ptr<Session>& session, const Caller& caller,
+                                  const Request& name, const SessionSnapshot* beginning) {
+  // nobody finds it in the one before it is in the other
+  const std::lock_guard one_at_a_time(backend_.claiming);
+  const SessionIdentity& identity = session->identity();
   try {
-    backend_.store->add({identity, session->scene()}, name, nullptr);
+    backend_.store->add({identity, session->scene()}, name, beginning);
+  } catch (const SessionExists& there) {
+    return refused(Registry::Exists{there.owner}, caller, session->id());
   } catch (const StoreError& error) {
     return errors::store_unwritable(error.what());
   }
-  return enroll(session, caller, name);
-}
-
-// Adds a session that the store has.
-grpc::Status SessionService::enroll(const std::shared_ptr<Session>& session, const Caller& caller,
-                                    const Request& name) {
   if (const auto reason = backend_.registry.add(session)) {
     backend_.store->erase(session->uid(), {}, [](const std::string&) {});
     return refused(*reason, caller, session->id());
@@ -233,12 +196,12 @@ grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSess
   const auto named = named_request(caller, request, request.request_id());
   if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
   const Request& name = std::get<Request>(named);
-  const auto known = backend_.requests.find(name);
+  const auto known = carried_out(name);
   if (const auto* error = std::get_if<grpc::Status>(&known)) return *error;
-  if (const auto& uid = std::get<std::optional<std::string>>(known))
-    return created_before(*uid, response);
+  if (const auto& creation = std::get<std::optional<CarriedOut>>(known))
+    return created_before(caller, *creation, response);
 
-  const auto found = find_session(backend_.registry, caller, parts->session);
+  const auto found = find_anywhere(backend_, caller, parts->session);
   if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
   const Session& source = *std::get<std::shared_ptr<Session>>(found);
   const auto snapshots = source.snapshots();
@@ -267,24 +230,21 @@ grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSess
   const auto session =
       std::make_shared<Session>(identity, Simulation(source.scene()), backend_.host(),
                                 backend_.store->log_of(identity.uid, past.first));
-  try {
-    backend_.store->add({identity, source.scene()}, name, &snapshot);
-  } catch (const StoreError& error) {
-    return errors::store_unwritable(error.what());
-  }
-  if (!session->restore(std::move(past))) {
-    backend_.store->erase(identity.uid, {}, [](const std::string&) {});
+  const SessionSnapshot beginning = snapshot;
+  if (!session->restore(std::move(past)))
     return errors::snapshot_damaged(request.name(), "it does not fit the scene of its session");
-  }
-  if (auto status = enroll(session, caller, name); !status.ok()) return status;
+  if (auto status = keep(session, caller, name, &beginning); !status.ok()) return status;
   response = to_proto(*session);
   return grpc::Status::OK;
 }
 
-grpc::Status SessionService::created_before(const std::string& uid, v1::Session& response) const {
-  const auto session = backend_.registry.find_uid(uid);
-  if (!session) return errors::session_not_found("that this request made; it was deleted since");
-  response = to_proto(*session);
+grpc::Status SessionService::created_before(const Caller& caller, const CarriedOut& creation,
+                                            v1::Session& response) {
+  if (creation.id.empty())
+    return errors::session_not_found("that this request made; it was deleted since");
+  const auto found = find_anywhere(backend_, caller, session_name(creation.id));
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
+  response = to_proto(*std::get<std::shared_ptr<Session>>(found));
   return grpc::Status::OK;
 }
 

@@ -1,7 +1,10 @@
 #include "server/rpc/errors.h"
 
+#include <google/protobuf/util/time_util.h>
+
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
@@ -12,7 +15,7 @@ namespace {
 constexpr int kMostViolations = 20;
 constexpr std::size_t kMostBytes = 4096;  // of the whole status
 constexpr std::size_t kMostText = 300;    // bytes of one text
-constexpr int kRetrySeconds = 1;
+constexpr std::chrono::milliseconds kRetry{1000}, kRetryElsewhere{50};
 
 std::string text(double value) {
   char buffer[32];
@@ -41,9 +44,10 @@ google::rpc::Status make(grpc::StatusCode code, const std::string& reason,
   return status;
 }
 
-void add_retry(google::rpc::Status& status) {
+void add_retry(google::rpc::Status& status, std::chrono::milliseconds delay = kRetry) {
   google::rpc::RetryInfo retry;
-  retry.mutable_retry_delay()->set_seconds(kRetrySeconds);
+  *retry.mutable_retry_delay() =
+      google::protobuf::util::TimeUtil::MillisecondsToDuration(delay.count());
   status.add_details()->PackFrom(retry);
 }
 
@@ -231,6 +235,21 @@ grpc::Status store_unwritable(const std::string& why) {
   auto status = make(grpc::StatusCode::UNAVAILABLE, "STORE_UNWRITABLE",
                      "the call was not carried out, because it cannot be written down: " + why);
   add_retry(status);
+  return to_grpc(status);
+}
+
+grpc::Status store_unreachable(const std::string& why) {
+  auto status = make(grpc::StatusCode::UNAVAILABLE, "STORE_UNREACHABLE",
+                     "the server cannot look for the session now: " + why);
+  add_retry(status);
+  return to_grpc(status);
+}
+
+grpc::Status wrong_replica(const std::string& name, const std::string& replica) {
+  auto status = make(grpc::StatusCode::UNAVAILABLE, "WRONG_REPLICA",
+                     name + " is with another server" + (replica.empty() ? "" : ", " + replica),
+                     {{"replica", replica}});
+  add_retry(status, kRetryElsewhere);
   return to_grpc(status);
 }
 

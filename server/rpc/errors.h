@@ -58,6 +58,12 @@ grpc::Status unauthenticated(const std::string& reason, const std::string& messa
 // A call that could not be written down, and was not carried out.
 grpc::Status store_unwritable(const std::string& why);
 
+// What the call needs to know of other servers' sessions cannot be read.
+grpc::Status store_unreachable(const std::string& why);
+
+// Another server has the session.
+grpc::Status wrong_replica(const std::string& name, const std::string& replica);
+
 grpc::Status server_draining(const Metadata& metadata = {});
 
 }  // namespace weft::errors

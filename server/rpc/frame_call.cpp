@@ -33,22 +33,37 @@ bool FrameCall::begin(const grpc::ServerContextBase& context) {
   return status.ok();
 }
 
-grpc::Status FrameCall::find(const std::string& name, const std::string& uid,
-                             const v1::FrameFormat& format, std::vector<Problem> problems) {
-  const auto found = find_session(backend_.registry, caller_.caller, name, "session");
-  if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
+void FrameCall::find(const std::string& name, const std::string& uid, const v1::FrameFormat& format,
+                     std::vector<Problem> problems) {
   name_ = name;
+  format_ = with_defaults(format);
+  if (const auto found = find_here(backend_, caller_.caller, name, "session")) {
+    if (const auto status = take(*found, uid, std::move(problems)); !status.ok()) end(status);
+    return;
+  }
+  find_elsewhere(backend_, caller_.caller, name,
+                 [self = shared_from_this(), uid, problems](const FoundSession& found) {
+                   std::lock_guard lock(self->mutex_);
+                   if (self->has_ended()) return;
+                   const auto status = self->take(found, uid, problems);
+                   if (!status.ok()) self->end(status);
+                   self->read_on();
+                 });
+}
+
+grpc::Status FrameCall::take(const FoundSession& found, const std::string& uid,
+                             std::vector<Problem> problems) {
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
   session_ = std::get<std::shared_ptr<Session>>(found);
   if (!uid.empty() && uid != session_->uid()) {
     return errors::aborted("UID_CHANGED", "this name belongs to another session now",
                            {{"uid", session_->uid()}});
   }
-  format_ = with_defaults(format);
   const auto particles = static_cast<std::int64_t>(session_->status().newest->positions.size()) / 3;
-  for (auto& problem : find_problems(format, particles, backend_.limits.max_frame_bytes)) {
+  for (auto& problem : find_problems(format_, particles, backend_.limits.max_frame_bytes)) {
     problems.push_back(std::move(problem));
   }
-  return problems.empty() ? grpc::Status::OK : errors::field_invalid(problems);
+  return problems.empty() ? open() : errors::field_invalid(problems);
 }
 
 void FrameCall::subscribe(std::optional<std::int64_t> start, SlowReader policy) {
@@ -119,6 +134,8 @@ void FrameCall::read_on(bool progress_due) {
           errors::solver_failed(session_->status().failure, reading.progress.latest_frame));
     case Reading::Kind::kDeleted:
       return finish(errors::session_not_found(name_));
+    case Reading::Kind::kTaken:
+      return finish(errors::wrong_replica(name_, ""));
   }
 }
 

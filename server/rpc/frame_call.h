@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/rpc/backend.h"
+#include "server/rpc/find.h"
 #include "weft/v1/frame.pb.h"
 
 namespace weft {
@@ -40,9 +41,10 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   // all below with the mutex held
   // First; false where the call is not taken, and finished.
   bool begin(const grpc::ServerContextBase& context);
-  // The session and format asked for, or why there are none; more `problems` may be known.
-  grpc::Status find(const std::string& name, const std::string& uid, const v1::FrameFormat& format,
-                    std::vector<Problem> problems);
+  // Looks for the session and format asked for, then opens the call or ends it; more `problems` may
+  // be known.
+  void find(const std::string& name, const std::string& uid, const v1::FrameFormat& format,
+            std::vector<Problem> problems);
   void subscribe(std::optional<std::int64_t> start, SlowReader policy);
   void write_header();
   void write(const grpc::ByteBuffer& message);
@@ -60,6 +62,8 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   std::mutex mutex_;  // guards all below, and what derived classes have
 
  private:
+  // What is left to do once session() is there: subscribes, and writes the header.
+  virtual grpc::Status open() = 0;
   // Whether something came before reading on, which is now done.
   virtual bool do_first() = 0;
   virtual bool wants_frame() const { return true; }
@@ -67,6 +71,8 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   virtual void start_write(const grpc::ByteBuffer* message) = 0;
   virtual void finish_call(const grpc::Status& status) = 0;
 
+  grpc::Status take(const FoundSession& found, const std::string& uid,
+                    std::vector<Problem> problems);
   void write_progress(const Progress& progress);
 
   Backend& backend_;

@@ -13,12 +13,8 @@ namespace weft {
 void FrameStream::start(const grpc::ServerContextBase& context, const grpc::ByteBuffer& request) {
   std::lock_guard lock(mutex_);
   if (!begin(context)) return;
-  if (auto status = open(request); !status.ok()) return finish(status);
-  write_header();
-}
-
-grpc::Status FrameStream::open(const grpc::ByteBuffer& request) {
-  if (!decode(request, request_)) return errors::message_malformed("weft.v1.StreamFramesRequest");
+  if (!decode(request, request_))
+    return finish(errors::message_malformed("weft.v1.StreamFramesRequest"));
   std::vector<Problem> problems;
   if (request_.start_frame() < 0) {
     problems.push_back({"start_frame", std::to_string(request_.start_frame()) + " is below 0"});
@@ -27,9 +23,11 @@ grpc::Status FrameStream::open(const grpc::ByteBuffer& request) {
     problems.push_back(
         {"slow_reader", std::to_string(request_.slow_reader()) + " is no weft.v1.SlowReader"});
   }
-  auto status = find(request_.session(), request_.uid(), request_.format(), std::move(problems));
-  if (!status.ok()) return status;
+  find(request_.session(), request_.uid(), request_.format(), std::move(problems));
+  read_on();
+}
 
+grpc::Status FrameStream::open() {
   const bool hold = request_.slow_reader() == v1::SLOW_READER_HOLD_SESSION;
   subscribe(request_.has_start_frame() ? std::optional(request_.start_frame()) : std::nullopt,
             hold ? SlowReader::kHoldSession : SlowReader::kDisconnect);
@@ -41,6 +39,7 @@ grpc::Status FrameStream::open(const grpc::ByteBuffer& request) {
                                                   " lies before the first frame, " +
                                                   std::to_string(first));
   }
+  write_header();
   return grpc::Status::OK;
 }
 

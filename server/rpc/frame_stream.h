@@ -22,7 +22,7 @@ class FrameStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer>, pub
   void OnDone() override { on_done(); }
 
  private:
-  grpc::Status open(const grpc::ByteBuffer& request);
+  grpc::Status open() override;
   bool do_first() override;
   grpc::ByteBuffer message_of(const Reading& reading) override;
   void start_write(const grpc::ByteBuffer* message) override { StartWrite(message); }

@@ -21,20 +21,18 @@ void FrameView::OnReadDone(bool ok) {
     no_more_ = true;
   } else {
     v1::ViewFramesRequest request;
-    const auto status = decode(request_, request)
-                            ? take(request)
-                            : errors::message_malformed("weft.v1.ViewFramesRequest");
+    const bool decoded = decode(request_, request);
     request_.Clear();
-    if (status.ok()) {
-      StartRead(&request_);
+    if (decoded) {
+      take(request);
     } else {
-      end(status);
+      end(errors::message_malformed("weft.v1.ViewFramesRequest"));
     }
   }
   read_on();
 }
 
-grpc::Status FrameView::take(const v1::ViewFramesRequest& request) {
+void FrameView::take(const v1::ViewFramesRequest& request) {
   std::vector<Problem> problems;
   const auto first_alone = [&](const char* field, bool given) {
     if (given) problems.push_back({field, "belongs to the first message alone"});
@@ -46,19 +44,22 @@ grpc::Status FrameView::take(const v1::ViewFramesRequest& request) {
     problems.push_back({"credits", std::to_string(credits_ + request.credits()) +
                                        " would be open; at most " + std::to_string(kMostCredits) +
                                        " are"});
-  }
-  if (is_subscribed()) {
-    first_alone("session", !request.session().empty());
-    first_alone("uid", !request.uid().empty());
-    first_alone("format", request.has_format());
-    if (!problems.empty()) return errors::field_invalid(problems);
   } else {
-    auto status = find(request.session(), request.uid(), request.format(), std::move(problems));
-    if (!status.ok()) return status;
-    subscribe({}, SlowReader::kSkip);
-    write_header();
+    credits_ += request.credits();
   }
-  credits_ += request.credits();
+  if (!is_subscribed())
+    return find(request.session(), request.uid(), request.format(), std::move(problems));
+  first_alone("session", !request.session().empty());
+  first_alone("uid", !request.uid().empty());
+  first_alone("format", request.has_format());
+  if (!problems.empty()) return end(errors::field_invalid(problems));
+  StartRead(&request_);
+}
+
+grpc::Status FrameView::open() {
+  subscribe({}, SlowReader::kSkip);
+  write_header();
+  StartRead(&request_);
   return grpc::Status::OK;
 }
 

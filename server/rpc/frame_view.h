@@ -24,7 +24,8 @@ class FrameView final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::B
   void OnDone() override { on_done(); }
 
  private:
-  grpc::Status take(const v1::ViewFramesRequest& request);
+  void take(const v1::ViewFramesRequest& request);
+  grpc::Status open() override;
   bool do_first() override;
   bool wants_frame() const override { return credits_ > 0; }
   grpc::ByteBuffer message_of(const Reading& reading) override;

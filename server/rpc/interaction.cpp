@@ -97,13 +97,37 @@ void Interaction::OnReadDone(bool ok) {
     if (!ending_) ending_ = grpc::Status::OK;
   } else if (!ending_) {
     v1::InteractRequest request;
-    const auto status = decode(request_, request)
-                            ? take(request)
-                            : errors::message_malformed("weft.v1.InteractRequest");
+    const bool decoded = decode(request_, request);
     request_.Clear();
-    if (!status.ok()) end(status);
+    if (!decoded) {
+      end(errors::message_malformed("weft.v1.InteractRequest"));
+    } else if (!session_) {
+      begin(request);
+    } else if (const auto status = take(request); !status.ok()) {
+      end(status);
+    }
   }
   act(lock);
+}
+
+void Interaction::begin(const v1::InteractRequest& first) {
+  if (const auto found = find_here(backend_, caller_.caller, first.session(), "session"))
+    return begin(*found, first);
+  reading_ = true;
+  find_elsewhere(backend_, caller_.caller, first.session(),
+                 [self = shared_from_this(), first](const FoundSession& found) {
+                   std::unique_lock lock(self->mutex_);
+                   self->reading_ = false;
+                   if (!self->ending_) self->begin(found, first);
+                   self->act(lock);
+                 });
+}
+
+void Interaction::begin(const FoundSession& found, const v1::InteractRequest& first) {
+  if (const auto* error = std::get_if<grpc::Status>(&found)) return end(*error);
+  session_ = std::get<std::shared_ptr<Session>>(found);
+  hand_ = session_->new_hand();
+  if (const auto status = take(first); !status.ok()) end(status);
 }
 
 void Interaction::OnWriteDone(bool ok) {
@@ -114,13 +138,7 @@ void Interaction::OnWriteDone(bool ok) {
 }
 
 grpc::Status Interaction::take(const v1::InteractRequest& request) {
-  if (!session_) {
-    const auto found =
-        find_session(backend_.registry, caller_.caller, request.session(), "session");
-    if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
-    session_ = std::get<std::shared_ptr<Session>>(found);
-    hand_ = session_->new_hand();
-  } else if (!request.session().empty() && id_of(request.session()) != session_->id()) {
+  if (!request.session().empty() && id_of(request.session()) != session_->id()) {
     return errors::field_invalid(
         "session", "\"" + request.session() + "\" is another one than the stream began with");
   }

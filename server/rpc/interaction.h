@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/rpc/backend.h"
+#include "server/rpc/find.h"
 #include "weft/v1/session.pb.h"
 
 namespace weft {
@@ -63,6 +64,8 @@ class Interaction final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc:
   void act(std::unique_lock<std::mutex>& lock);
   void submit(std::unique_lock<std::mutex>& lock, std::vector<Action> actions, Done done);
   // with the mutex held
+  void begin(const v1::InteractRequest& first);
+  void begin(const FoundSession& found, const v1::InteractRequest& first);
   grpc::Status take(const v1::InteractRequest& request);
   void read();
   void end(const grpc::Status& status);
@@ -80,7 +83,7 @@ class Interaction final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc:
   int hand_ = 0;
   std::int64_t sequence_ = 0;  // of the latest message
   Batch waiting_;
-  bool reading_ = false;
+  bool reading_ = false;  // or the session of the first message is looked for
   bool busy_ = false;     // a batch is with the session, or its answer on the way
   bool holds_ = false;    // it may have grabbed something
   bool letting_ = false;  // it lets go, and is then finished

@@ -51,18 +51,4 @@ std::string make_session_id() {
   return id;
 }
 
-FoundSession find_session(const Registry& registry, const Caller& caller, const std::string& name,
-                          const std::string& field) {
-  const std::string id = id_of(name);
-  if (!is_session_id(id)) {
-    return errors::field_invalid(field, "\"" + name +
-                                            "\" is not sessions/ and 1 to 63 characters of a-z, "
-                                            "0-9 and -, beginning with a letter");
-  }
-  if (auto session = registry.find(id); session && caller.may_use(*session)) return session;
-  if (!caller.is_admin) return errors::session_not_yours(name);
-  if (const auto damaged = registry.damaged(id)) return errors::session_damaged(name, damaged->why);
-  return errors::session_not_found(name);
-}
-
 }  // namespace weft

@@ -2,13 +2,8 @@
 
 #include <grpcpp/support/status.h>
 
-#include <memory>
 #include <optional>
 #include <string>
-#include <variant>
-
-#include "server/rpc/access.h"
-#include "server/session/registry.h"
 
 // Resource names: "sessions/{session}", "sessions/{session}/snapshots/{snapshot}".
 namespace weft {
@@ -35,12 +30,5 @@ std::optional<SnapshotName> read_snapshot_name(const std::string& name);
 
 // An id that nobody will guess to be taken.
 std::string make_session_id();
-
-using FoundSession = std::variant<std::shared_ptr<Session>, grpc::Status>;
-
-// The caller's session called `name`, or why there is none; `field` is where the request names it.
-// Admins find every session. To others, one that is not theirs looks as if there were none.
-FoundSession find_session(const Registry& registry, const Caller& caller, const std::string& name,
-                          const std::string& field = "name");
 
 }  // namespace weft

@@ -11,14 +11,13 @@
 #include "server/rpc/server_service.h"
 
 namespace weft {
-namespace {
 
 void add_damaged(Backend& backend, const DamagedSession& damaged) {
   spdlog::error("{} is damaged: {}", session_name(damaged.id), damaged.why);
   backend.registry.restore(damaged.id, {damaged.uid, damaged.why});
 }
 
-void restore(Backend& backend, LeftSession left) {
+void restore_session(Backend& backend, LeftSession left) {
   const SessionIdentity& identity = left.session.identity;
   Simulation simulation(std::move(left.session.scene));
   if (simulation.refusal()) {
@@ -28,9 +27,9 @@ void restore(Backend& backend, LeftSession left) {
     spdlog::warn("{} was created with numerics {}; its frames may differ in their last bits now",
                  session_name(identity.id), identity.numerics_id);
   }
-  const auto entries = left.past.first + static_cast<std::int64_t>(left.past.log.size());
-  const auto session = std::make_shared<Session>(identity, std::move(simulation), backend.host(),
-                                                 backend.store->log_of(identity.uid, entries));
+  const auto session =
+      std::make_shared<Session>(identity, std::move(simulation), backend.host(),
+                                backend.store->log_of(identity.uid, left.past.entries()));
   left.past.snapshot = backend.store->snapshot(identity.uid, left.past);
   if (left.past.snapshot && left.past.snapshot->numerics_id != numerics_id()) {
     spdlog::warn("{} goes on from frame {}, which numerics {} computed", session_name(identity.id),
@@ -45,8 +44,6 @@ void restore(Backend& backend, LeftSession left) {
   backend.registry.restore(session);
 }
 
-}  // namespace
-
 void restore_sessions(Backend& backend) {
   LeftBehind left = backend.store->load();
   for (const auto& [request, uid] : left.requests) backend.requests.remember(request, uid);
@@ -57,7 +54,7 @@ void restore_sessions(Backend& backend) {
   for (int i = 0; i < backend.worker_threads; ++i) {
     threads.emplace_back([&] {
       for (std::size_t k = next++; k < left.sessions.size(); k = next++) {
-        restore(backend, std::move(left.sessions[k]));
+        restore_session(backend, std::move(left.sessions[k]));
       }
     });
   }

@@ -8,4 +8,8 @@ namespace weft {
 // workers. They go on by themselves. Throws StoreError where the store cannot be read.
 void restore_sessions(Backend& backend);
 
+// Makes one that was left, which goes on by itself.
+void restore_session(Backend& backend, LeftSession left);
+void add_damaged(Backend& backend, const DamagedSession& damaged);
+
 }  // namespace weft

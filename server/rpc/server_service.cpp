@@ -19,6 +19,7 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
   response->set_numerics_id(numerics_id());
   response->set_worker_threads(backend_.worker_threads);
   response->set_sessions(static_cast<std::int64_t>(backend_.registry.size()));
+  response->set_replica(backend_.replica);
   v1::Limits* limits = response->mutable_limits();
   limits->set_max_sessions(backend_.limits.max_sessions);
   limits->set_max_particles_per_session(backend_.limits.max_particles_per_session);

@@ -2,12 +2,14 @@
 
 #include <functional>
 #include <memory>
-#include <mutex>
-#include <set>
+#include <optional>
 #include <string>
+#include <variant>
 
 #include "server/rpc/backend.h"
+#include "server/rpc/find.h"
 #include "server/rpc/interaction.h"
+#include "server/rpc/unary_call.h"
 #include "weft/v1/session.grpc.pb.h"
 
 namespace weft {
@@ -76,31 +78,31 @@ class SessionService final : public SessionMethods {
                                            const v1::RestoreSessionRequest* request,
                                            v1::Session* response) override;
 
-  // Answers every creation and ends every interaction under way: the server is going down.
-  void drain();
+  // Ends every interaction under way: the server is going down.
+  void drain() { interactions_.drain(); }
 
  private:
-  class Creation;
   using Make = std::function<grpc::Status(v1::Session&)>;
-  grpc::ServerUnaryReactor* create_later(grpc::Status status, v1::Session* response, Make make);
-  bool begin(const std::shared_ptr<Creation>& creation);
-  void end(const std::shared_ptr<Creation>& creation);
+  grpc::ServerUnaryReactor* create_later(v1::Session* response, Make make);
   grpc::Status refusal(const Caller& caller, const v1::CreateSessionRequest& request,
                        const std::string& id) const;
   grpc::Status create(const Caller& caller, const v1::CreateSessionRequest& request,
                       v1::Session& response);
   grpc::Status restore(const Caller& caller, const v1::RestoreSessionRequest& request,
                        v1::Session& response);
-  grpc::Status enroll(const std::shared_ptr<Session>& session, const Caller& caller,
-                      const Request& name);
-  grpc::Status created_before(const std::string& uid, v1::Session& response) const;
-  grpc::Status list(const Caller& caller, const v1::ListSessionsRequest& request,
-                    v1::ListSessionsResponse& response) const;
+  grpc::Status keep(const std::shared_ptr<Session>& session, const Caller& caller,
+                    const Request& name, const SessionSnapshot* beginning);
+  std::variant<std::optional<CarriedOut>, grpc::Status> carried_out(const Request& request) const;
+  grpc::Status created_before(const Caller& caller, const CarriedOut& creation,
+                              v1::Session& response);
+  v1::ListSessionsResponse list(const Caller& caller, const v1::ListSessionsRequest& request) const;
+  v1::ListSessionsResponse list_all(const Caller& caller,
+                                    const v1::ListSessionsRequest& request) const;
+  void erase(UnaryCall& call, const v1::DeleteSessionRequest& request, const Request& name,
+             const FoundSession& found);
 
   Backend& backend_;
   Interactions interactions_;
-  std::mutex mutex_;
-  std::set<std::shared_ptr<Creation>> creations_;  // guarded by mutex_
 };
 
 }  // namespace weft

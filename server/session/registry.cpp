@@ -93,14 +93,14 @@ std::size_t Registry::size() const {
   return sessions_.size();
 }
 
-bool Registry::erase(const std::shared_ptr<Session>& session) {
+bool Registry::erase(const std::shared_ptr<Session>& session, Refusal::Why why) {
   {
     std::lock_guard lock(mutex_);
     const auto found = sessions_.find(session->id());
     if (found == sessions_.end() || found->second.session != session) return false;
     sessions_.erase(found);
   }
-  session->close(Refusal::Why::kDeleted);
+  session->close(why);
   return true;
 }
 

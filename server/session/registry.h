@@ -53,7 +53,7 @@ class Registry {
   std::size_t size() const;
 
   // Takes a session out and ends it; false where it is not one of them.
-  bool erase(const std::shared_ptr<Session>& session);
+  bool erase(const std::shared_ptr<Session>& session, Refusal::Why why = Refusal::Why::kDeleted);
 
   // Ends every session, and adds none any more. They can still be found.
   void close(Refusal::Why why);

@@ -23,12 +23,6 @@ std::string make_uid() {
   return uid;
 }
 
-std::vector<Textile> textiles_of(const Scene& scene) {
-  std::vector<Textile> textiles;
-  for (const auto& sheet : scene.sheets) textiles.push_back(sheet.textile);
-  return textiles;
-}
-
 // Whether the command has no caller who could send it again.
 bool must_be_taken(const Command& command) {
   const auto* act = std::get_if<Act>(&command);
@@ -43,6 +37,12 @@ std::int64_t count_particles(const Scene& scene) {
 }
 
 }  // namespace
+
+std::vector<Textile> textiles_of(const Scene& scene) {
+  std::vector<Textile> textiles;
+  for (const auto& sheet : scene.sheets) textiles.push_back(sheet.textile);
+  return textiles;
+}
 
 SessionIdentity make_identity(std::string id, std::string numerics_id, std::string owner) {
   return {std::move(id), make_uid(), std::move(numerics_id), std::chrono::system_clock::now(),
@@ -61,6 +61,7 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
       particle_count_(count_particles(scene_)),
       snapshot_after_(host.snapshot_after),
       max_snapshots_(host.max_snapshots),
+      reach_interval_(host.reach_time),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),
       history_(host.history_bytes) {
@@ -374,11 +375,11 @@ void Session::write_reach() {
     const std::int64_t wanted = std::min(latest() + ahead_ / 2, goal());
     const bool suffices = !active() || (reach_.frame >= wanted && reach_suffices());
     if (suffices && has_readers() == reach_.history_from.has_value()) return;
-    constexpr std::int64_t kLeast = 8, kMost = 4096;
+    constexpr std::int64_t kLeast = 8, kMost = 16'384;
     const auto now = Clock::now();
     if (!suffices) {
-      if (now - reach_time_ < std::chrono::milliseconds(500)) ahead_ = std::min(2 * ahead_, kMost);
-      if (now - reach_time_ > std::chrono::seconds(2)) ahead_ = std::max(ahead_ / 2, kLeast);
+      if (now - reach_time_ < reach_interval_) ahead_ = std::min(2 * ahead_, kMost);
+      if (now - reach_time_ > 4 * reach_interval_) ahead_ = std::max(ahead_ / 2, kLeast);
       reach_time_ = now;
     }
     reach = reach_to(std::min(latest() + ahead_, goal()));

@@ -35,6 +35,9 @@ struct SessionIdentity {
 // A new session's, with a uid of 128 random bits.
 SessionIdentity make_identity(std::string id, std::string numerics_id, std::string owner = {});
 
+// Of each sheet.
+std::vector<Textile> textiles_of(const Scene& scene);
+
 // What a session shows of itself.
 struct SessionStatus {
   SessionState state = SessionState::kPaused;
@@ -54,6 +57,9 @@ struct SessionPast {
   std::optional<SessionSnapshot> snapshot = {};
   std::int64_t first = 0;                 // entries that were forgotten before those of `log`
   std::vector<NamedSnapshot> named = {};  // in order of frame
+
+  // There were so far.
+  std::int64_t entries() const { return first + static_cast<std::int64_t>(log.size()); }
 };
 
 // Hears what an operator should know: repairs and failures, a line each. Called from any thread,
@@ -69,6 +75,10 @@ struct SessionHost {
   // Computing between two snapshots; a session of more than 20 000 particles has them more rarely.
   std::chrono::duration<double> snapshot_after{2};
   std::size_t max_snapshots = 16;  // on demand
+  // The log is not told more often how far frames may be published, and the session goes on for
+  // about as long without an answer.
+  static constexpr std::chrono::duration<double> kReachTime{0.5};
+  std::chrono::duration<double> reach_time = kReachTime;
 };
 
 // A simulation that advances on a scheduler. Calls reach it as commands that are carried out
@@ -95,6 +105,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   // that far. Called at most once, first.
   [[nodiscard]] bool restore(SessionPast past);
 
+  const SessionIdentity& identity() const { return identity_; }
   const std::string& id() const { return identity_.id; }
   const std::string& uid() const { return identity_.uid; }
   const std::string& numerics_id() const { return identity_.numerics_id; }
@@ -245,6 +256,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::chrono::duration<double> work_{};  // since the last snapshot; touched by the slice only
   std::int64_t entries_in_snapshot_ = 0;  // the last one; touched by the slice only
   const std::size_t max_snapshots_;
+  const std::chrono::duration<double> reach_interval_;
 
   mutable std::mutex mutex_;  // guards all below
   std::deque<Command> commands_;

@@ -54,8 +54,9 @@ Reading Session::read(Subscription& subscription, bool frame_wanted) {
   {
     std::lock_guard lock(mutex_);
     reading.progress = progress();
-    if (closed_ == Refusal::Why::kDeleted) {
-      reading.kind = Reading::Kind::kDeleted;
+    if (closed_ == Refusal::Why::kDeleted || closed_ == Refusal::Why::kTaken) {
+      const bool taken = closed_ == Refusal::Why::kTaken;
+      reading.kind = taken ? Reading::Kind::kTaken : Reading::Kind::kDeleted;
       return reading;
     }
     if (!frame_wanted && subscription.next_ <= latest()) return reading;

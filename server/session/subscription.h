@@ -41,6 +41,7 @@ struct Reading {
     kExpired,  // the next frame is no longer kept
     kFailed,   // there will be no next frame
     kDeleted,
+    kTaken,  // by another server
   };
   Kind kind = Kind::kNothingYet;
   std::shared_ptr<const Frame> frame;  // of kFrame

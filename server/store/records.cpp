@@ -160,6 +160,41 @@ LogEntry decode_entry(const std::string& bytes) {
   return {from.frame(), {from.request_id(), from.request_checksum()}, event_of(from)};
 }
 
+std::string entry_key(const std::string& uid, std::int64_t number) {
+  return uid + "/" + std::to_string(number);
+}
+
+LeftSession assemble(const std::string& uid, const std::string& id, const Row& session,
+                     const Row& progress, const std::vector<NumberedRow>& entries) {
+  if (session.checksum != checksum(uid, session.record))
+    throw StoreError("the checksum of its scene is wrong");
+  LeftSession left{decode_session(session.record), {}};
+  if (left.session.identity.id != id || left.session.identity.uid != uid)
+    throw StoreError("it has another name");
+  if (progress.checksum != checksum(uid, progress.record))
+    throw StoreError("the checksum of how far it came is wrong");
+  const Progress come = decode_progress(progress.record);
+  left.past.reach = come.reach;
+
+  // where the first ones are missing for another reason than that they were forgotten, no snapshot
+  // will fit
+  std::int64_t next = entries.empty() ? come.entries : entries.front().number;
+  left.past.first = next;
+  auto& log = left.past.log;
+  for (const NumberedRow& row : entries) {
+    if (row.number != next || row.checksum != checksum(entry_key(uid, next), row.record)) {
+      throw StoreError("entry " + std::to_string(next) +
+                       " of its log is missing, or its checksum is wrong");
+    }
+    log.push_back(decode_entry(row.record));
+    if (log.size() > 1 && log.back().frame < log[log.size() - 2].frame)
+      throw StoreError("its log is out of order");
+    ++next;
+  }
+  if (next != come.entries) throw StoreError("its log has lost its end");
+  return left;
+}
+
 std::uint32_t checksum(const std::string& key, const std::string& record) {
   const auto bytes = [](const std::string& text) {
     return reinterpret_cast<const Bytef*>(text.data());

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "server/store/store.h"
 
@@ -26,6 +27,23 @@ KeptSession decode_session(const std::string& bytes);
 Progress decode_progress(const std::string& bytes);
 LogEntry decode_entry(const std::string& bytes);
 SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes);
+
+// A record as a store has it.
+struct Row {
+  std::string record;
+  std::int64_t checksum = 0;
+};
+struct NumberedRow : Row {
+  std::int64_t number = 0;
+};
+
+// A session of its rows, entries in order of number, without its named snapshots. Throws StoreError
+// for what cannot be trusted.
+LeftSession assemble(const std::string& uid, const std::string& id, const Row& session,
+                     const Row& progress, const std::vector<NumberedRow>& entries);
+
+// What the checksum of an entry covers beside the record.
+std::string entry_key(const std::string& uid, std::int64_t number);
 
 std::chrono::system_clock::time_point time_of(const google::protobuf::Timestamp& timestamp);
 

@@ -15,6 +15,7 @@
 
 #include "server/store/records.h"
 #include "server/store/snapshot_files.h"
+#include "server/store/snapshots.h"
 
 namespace weft {
 namespace {
@@ -47,10 +48,7 @@ constexpr const char* kTables = R"(
 )";
 
 using records::checksum;
-
-std::string entry_key(const std::string& uid, std::int64_t number) {
-  return uid + "/" + std::to_string(number);
-}
+using records::entry_key;
 
 std::string make_path(const std::string& directory) {
   namespace fs = std::filesystem;
@@ -126,7 +124,8 @@ class SqliteStore final : public SessionStore {
   static SQLite::Database open(const std::string& path);
   static void keep_request(SQLite::Database& database, const Request& request,
                            const std::string& uid);
-  LeftSession load_session(const std::string& uid, const std::string& record);
+  LeftSession load_session(const std::string& uid, const std::string& id,
+                           const records::Row& session);
   void post(Work work, SessionLog::Written written);
   void work();
   std::string commit(const std::deque<Job>& jobs);
@@ -138,7 +137,15 @@ class SqliteStore final : public SessionStore {
   std::deque<Job> jobs_;
   bool stopping_ = false;
   std::thread thread_;
-  SnapshotFiles snapshots_{std::filesystem::path(path_).replace_filename("snapshots")};
+  std::unique_ptr<SnapshotFiles> make_shelf() {
+    const auto directory = std::filesystem::path(path_).replace_filename("snapshots");
+    auto shelf = std::make_unique<SnapshotFiles>(directory);
+    snapshot_files_ = shelf.get();
+    return shelf;
+  }
+
+  const SnapshotFiles* snapshot_files_ = nullptr;
+  Snapshots snapshots_{make_shelf()};
 };
 
 SQLite::Database SqliteStore::open(const std::string& path) try {
@@ -181,14 +188,8 @@ LeftBehind SqliteStore::load() try {
     const std::string uid = row.getColumn(0).getString();
     const std::string id = row.getColumn(1).getString();
     try {
-      const std::string record = blob(row.getColumn(2));
-      if (row.getColumn(3).getInt64() != checksum(uid, record)) {
-        throw StoreError("the checksum of its scene is wrong");
-      }
-      LeftSession session = load_session(uid, record);
-      const SessionIdentity& identity = session.session.identity;
-      if (identity.id != id || identity.uid != uid) throw StoreError("it has another name");
-      left.sessions.push_back(std::move(session));
+      left.sessions.push_back(
+          load_session(uid, id, {blob(row.getColumn(2)), row.getColumn(3).getInt64()}));
     } catch (const StoreError& error) {
       left.damaged.push_back({id, uid, error.what()});
     } catch (const SQLite::Exception& error) {
@@ -196,47 +197,28 @@ LeftBehind SqliteStore::load() try {
     }
     uids.insert(uid);
   }
-  snapshots_.keep_only(uids);
+  snapshot_files_->keep_only(uids);
   return left;
 } catch (const SQLite::Exception& error) {
   throw StoreError(text_of(path_, error));
 }
 
-LeftSession SqliteStore::load_session(const std::string& uid, const std::string& record) {
-  LeftSession left{records::decode_session(record), {}};
-  SQLite::Statement progress_row(database_, "SELECT record, checksum FROM progress WHERE uid = ?");
-  progress_row.bind(1, uid);
-  if (!progress_row.executeStep()) throw StoreError("it does not say how far it came");
-  const std::string bytes = blob(progress_row.getColumn(0));
-  if (progress_row.getColumn(1).getInt64() != checksum(uid, bytes)) {
-    throw StoreError("the checksum of how far it came is wrong");
-  }
-  const records::Progress progress = records::decode_progress(bytes);
-  left.past.reach = progress.reach;
-
+LeftSession SqliteStore::load_session(const std::string& uid, const std::string& id,
+                                      const records::Row& session) {
+  SQLite::Statement come(database_, "SELECT record, checksum FROM progress WHERE uid = ?");
+  come.bind(1, uid);
+  if (!come.executeStep()) throw StoreError("it does not say how far it came");
+  const records::Row progress{blob(come.getColumn(0)), come.getColumn(1).getInt64()};
   SQLite::Statement row(database_,
                         "SELECT number, record, checksum FROM entry WHERE uid = ? ORDER BY number");
   row.bind(1, uid);
-  // where the first ones are missing for another reason than that they were forgotten, no snapshot
-  // will fit
-  std::int64_t next = -1;
-  left.past.first = progress.entries;
-  for (; row.executeStep(); ++next) {
-    if (next < 0) left.past.first = next = row.getColumn(0).getInt64();
-    const std::string entry = blob(row.getColumn(1));
-    const bool sound = row.getColumn(0).getInt64() == next &&
-                       row.getColumn(2).getInt64() == checksum(entry_key(uid, next), entry);
-    if (!sound) {
-      throw StoreError("entry " + std::to_string(next) +
-                       " of its log is missing, or its checksum is wrong");
-    }
-    left.past.log.push_back(records::decode_entry(entry));
-    const auto& log = left.past.log;
-    if (log.size() > 1 && log.back().frame < log[log.size() - 2].frame)
-      throw StoreError("its log is out of order");
+  std::vector<records::NumberedRow> entries;
+  while (row.executeStep()) {
+    entries.push_back(
+        {{blob(row.getColumn(1)), row.getColumn(2).getInt64()}, row.getColumn(0).getInt64()});
   }
-  if (next >= 0 && next != progress.entries) throw StoreError("its log has lost its end");
-  left.past.named = snapshots_.named(uid, progress.entries);
+  LeftSession left = records::assemble(uid, id, session, progress, entries);
+  left.past.named = snapshots_.named(uid, left.past.entries());
   return left;
 }
 

@@ -5,6 +5,8 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/model/scene.h"
@@ -36,15 +38,45 @@ struct KeptRequest {
   std::string uid;
 };
 
+// The same with the id of its session, where that is still there.
+struct CarriedOut {
+  KeptRequest kept;
+  std::string id;
+};
+
 struct LeftBehind {
   std::vector<LeftSession> sessions;
   std::vector<DamagedSession> damaged;
   std::vector<KeptRequest> requests;  // oldest first
 };
 
+// A session that another server has.
+struct Elsewhere {
+  std::string replica;  // that server
+  std::string owner;    // principal
+};
+
+// What is known of a session that this server does not have: nothing, who has it, or what it goes
+// on from here, since it is this server's now.
+using Claim = std::variant<std::monostate, Elsewhere, LeftSession, DamagedSession>;
+
+// A session of any server.
+struct ListedSession {
+  KeptSession session;
+  std::string replica;  // that has it; empty: none
+};
+
 class StoreError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
+};
+
+// Another server has made a session of that name.
+class SessionExists : public StoreError {
+ public:
+  explicit SessionExists(std::string principal)
+      : StoreError("there is one of that name"), owner(std::move(principal)) {}
+  std::string owner;  // principal
 };
 
 // Where sessions outlive the server. Thread-safe.
@@ -57,7 +89,7 @@ class SessionStore {
 
   // Keeps a new session, made by `creation`, and waits until it is safe. It begins with its scene,
   // or at a snapshot that says to come after one entry of a log, which is forgotten. Throws
-  // StoreError.
+  // StoreError; SessionExists where several servers share the store.
   virtual void add(const KeptSession& session, const Request& creation,
                    const SessionSnapshot* beginning) = 0;
 
@@ -76,6 +108,33 @@ class SessionStore {
   // Forgets a session, if it is there; `written` as in SessionLog.
   virtual void erase(const std::string& uid, const Request& deletion,
                      const SessionLog::Written& written) = 0;
+
+  // What follows is for stores that several servers share, each session being one server's at a
+  // time. All of it waits for the store, and throws StoreError.
+  virtual bool is_shared() const { return false; }
+
+  // A session that this server does not have, by its id; taken over where no living server has it.
+  virtual Claim claim(const std::string& /*id*/) { return {}; }
+
+  // In order of id, at most `count` of those after `after`; of one owner, or of all.
+  virtual std::vector<ListedSession> list(const std::string& /*after*/, std::size_t /*count*/,
+                                          const std::optional<std::string>& /*owner*/) {
+    return {};
+  }
+
+  // A creation or deletion that any of the servers carried out.
+  virtual std::optional<CarriedOut> find_request(const std::string& /*id*/) { return {}; }
+
+  // Has every session be heard of that another server took over, by uid, and of sessions whose
+  // server died, by id; from a thread of the store's, which must not be held up. Called once.
+  struct Watch {
+    std::function<void(const std::string& uid)> taken;
+    std::function<void(const std::string& id)> orphaned;
+  };
+  virtual void watch(Watch /*watch*/) {}
+
+  // Lets go of every session, for other servers to take over, and is used no more.
+  virtual void leave() {}
 };
 
 // Keeps nothing: sessions end with the server.
@@ -84,5 +143,11 @@ std::unique_ptr<SessionStore> make_no_store();
 // Keeps sessions in an SQLite file in the directory, which is made where it is missing. Throws
 // StoreError where the file cannot be used, or another process uses it.
 std::unique_ptr<SessionStore> open_sqlite_store(const std::string& directory);
+
+// Keeps sessions in a PostgreSQL database that several servers share, in its schema "weft", which
+// is made where it is missing. `url` is a connection string or URI of libpq; `replica` is what
+// other servers call this one. Throws StoreError where the database cannot be used.
+std::unique_ptr<SessionStore> open_postgres_store(const std::string& url,
+                                                  const std::string& replica);
 
 }  // namespace weft

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "server/store/snapshot_files.h"
+#include "server/store/snapshots.h"
 #include "tests/support/service/service.h"
 #include "tests/support/temporary_directory.h"
 
@@ -438,7 +439,7 @@ TEST_F(RestartWithSnapshots, KeepsSomeOfThemAndNoneOfASessionThatIsGone) {
   const v1::Session session = service_->create(), other = service_->create();
   for (int i = 0; i < 10; ++i) kept(session);
   kept(other);
-  while (files_of(session).size() != SnapshotFiles::kMost) std::this_thread::yield();
+  while (files_of(session).size() != weft::Snapshots::kMost) std::this_thread::yield();
   service_->erase(other);
   while (std::filesystem::exists(snapshots_of(other))) std::this_thread::yield();
 }
@@ -456,7 +457,7 @@ TEST_F(RestartWithSnapshots, NeverMistakesADamagedOneForASound) {
   ASSERT_LT(older, newest);
   const std::string good = content(file);
   spdlog::set_level(spdlog::level::off);
-  const SnapshotFiles files(directory_.path("snapshots"));
+  const weft::Snapshots files(std::make_unique<SnapshotFiles>(directory_.path("snapshots")));
   const auto frame_with = [&](const std::string& bytes) {
     std::ofstream(file, std::ios::binary) << bytes;
     return files.read(session.uid(), std::nullopt, 0)->simulation.frame;
@@ -605,7 +606,7 @@ TEST(Snapshots, AreKeptWhereARestartNeedsThem) {
     kept.push_back({frame, 1});
     const std::int64_t oldest = std::max<std::int64_t>(0, frame - 300);
     discard(oldest);
-    EXPECT_LE(kept.size(), SnapshotFiles::kMost);
+    EXPECT_LE(kept.size(), weft::Snapshots::kMost);
     EXPECT_EQ(kept.back().frame, frame);
     if (frame == 10) continue;
     EXPECT_EQ(kept[kept.size() - 2].frame, frame - 10);

@@ -1,0 +1,78 @@
+#include "server/rpc/find.h"
+
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "server/rpc/errors.h"
+#include "server/rpc/names.h"
+#include "server/rpc/restore.h"
+
+namespace weft {
+namespace {
+
+FoundSession in_registry(const Registry& registry, const Caller& caller, const std::string& name) {
+  const std::string id = id_of(name);
+  if (auto session = registry.find(id); session && caller.may_use(*session)) return session;
+  if (!caller.is_admin) return errors::session_not_yours(name);
+  if (const auto damaged = registry.damaged(id)) return errors::session_damaged(name, damaged->why);
+  return errors::session_not_found(name);
+}
+
+}  // namespace
+
+std::optional<FoundSession> find_here(const Backend& backend, const Caller& caller,
+                                      const std::string& name, const std::string& field) {
+  const std::string id = id_of(name);
+  if (!is_session_id(id)) {
+    return errors::field_invalid(field, "\"" + name +
+                                            "\" is not sessions/ and 1 to 63 characters of a-z, "
+                                            "0-9 and -, beginning with a letter");
+  }
+  const bool here = backend.registry.find(id) != nullptr || backend.registry.damaged(id);
+  if (!here && backend.store->is_shared()) return std::nullopt;
+  return in_registry(backend.registry, caller, name);
+}
+
+FoundSession find_anywhere(Backend& backend, const Caller& caller, const std::string& name,
+                           const std::string& field) try {
+  const std::lock_guard one_at_a_time(backend.claiming);
+  if (auto found = find_here(backend, caller, name, field)) return *std::move(found);
+  if (backend.draining) return errors::server_draining();
+  const std::string id = id_of(name);
+  Claim claim = backend.store->claim(id);
+  if (const auto* elsewhere = std::get_if<Elsewhere>(&claim)) {
+    return caller.may_use(elsewhere->owner) ? errors::wrong_replica(name, elsewhere->replica)
+                                            : errors::session_not_yours(name);
+  }
+  if (auto* left = std::get_if<LeftSession>(&claim)) {
+    spdlog::info("{} is taken over", name);
+    restore_session(backend, std::move(*left));
+  } else if (const auto* damaged = std::get_if<DamagedSession>(&claim)) {
+    add_damaged(backend, *damaged);
+  }
+  return in_registry(backend.registry, caller, name);
+} catch (const StoreError& error) {
+  return errors::store_unreachable(error.what());
+}
+
+void find_elsewhere(Backend& backend, const Caller& caller, const std::string& name, Found then) {
+  const auto found = std::make_shared<std::shared_ptr<Session>>();
+  backend.store_calls.ask(
+      [&backend, caller, name, found] {
+        FoundSession result = find_anywhere(backend, caller, name);
+        if (const auto* error = std::get_if<grpc::Status>(&result)) return *error;
+        *found = std::get<std::shared_ptr<Session>>(std::move(result));
+        return grpc::Status::OK;
+      },
+      [found, then = std::move(then)](const grpc::Status& status) {
+        then(status.ok() ? FoundSession(*found) : FoundSession(status));
+      });
+}
+
+void adopt_session(Backend& backend, const std::string& id) {
+  const Caller admin{"", true};
+  find_elsewhere(backend, admin, session_name(id), [](const FoundSession&) {});
+}
+
+}  // namespace weft

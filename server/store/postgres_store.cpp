@@ -1,0 +1,626 @@
+#include <spdlog/spdlog.h>
+
+#include <condition_variable>
+#include <deque>
+#include <exception>
+#include <future>
+#include <iterator>
+#include <map>
+#include <mutex>
+#include <pqxx/pqxx>
+#include <set>
+#include <thread>
+#include <utility>
+
+#include "server/store/postgres_connection.h"
+#include "server/store/postgres_tables.h"
+#include "server/store/records.h"
+#include "server/store/snapshots.h"
+#include "server/store/store.h"
+
+namespace weft {
+namespace {
+
+using records::checksum;
+using records::entry_key;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kLease{3000}, kRenewal{400};
+constexpr milliseconds kFirstPause{50}, kLongestPause{1000};  // before work is tried again
+constexpr int kOrphans = 4;                                   // that are named at a time
+constexpr std::int64_t kFewEntries = 256;                     // that are not worth forgetting
+
+pqxx::binarystring binary(const std::string& bytes) { return {bytes.data(), bytes.size()}; }
+std::string bytes_of(const pqxx::field& field) { return pqxx::binarystring(field).str(); }
+std::int64_t number_of(const pqxx::field& field) { return field.as<std::int64_t>(); }
+
+const std::vector<PostgresConnection::Statement> kLogStatements = {
+    {"progress",
+     "UPDATE weft.session SET progress = $4, checksum = $5 "
+     "WHERE uid = $1 AND owner = $2 AND epoch = $3"},
+    {"entry",
+     "INSERT INTO weft.entry VALUES ($1, $2, $3, $4) ON CONFLICT (uid, number) "
+     "DO UPDATE SET record = excluded.record, checksum = excluded.checksum"}};
+const std::vector<PostgresConnection::Statement> kSnapshotStatements = {
+    {"write",
+     "INSERT INTO weft.snapshot SELECT uid, $2::text, $3::bytea FROM weft.session "
+     "WHERE uid = $1 AND owner = $4 AND epoch = $5 "
+     "ON CONFLICT (uid, name) DO UPDATE SET content = excluded.content"}};
+
+// Under which a server has a session, and writes of it are taken.
+struct Tenure {
+  std::int64_t owner = 0;
+  std::int64_t epoch = 0;
+};
+
+// The sessions that a server has. Thread-safe.
+class Tenures {
+ public:
+  void set(const std::string& uid, const Tenure& tenure) {
+    std::lock_guard lock(mutex_);
+    tenures_[uid] = tenure;
+  }
+  // An epoch that no session has, where it is not one of them.
+  Tenure of(const std::string& uid) const {
+    std::lock_guard lock(mutex_);
+    const auto found = tenures_.find(uid);
+    return found == tenures_.end() ? Tenure{} : found->second;
+  }
+  bool erase(const std::string& uid) {
+    std::lock_guard lock(mutex_);
+    return tenures_.erase(uid) > 0;
+  }
+  std::set<std::string> uids() const {
+    std::lock_guard lock(mutex_);
+    std::set<std::string> uids;
+    for (const auto& [uid, tenure] : tenures_) uids.insert(uid);
+    return uids;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, Tenure> tenures_;
+};
+
+class SnapshotTable final : public SnapshotShelf {
+ public:
+  SnapshotTable(const std::string& url, const Tenures& tenures)
+      : connection_(url, kSnapshotStatements), tenures_(tenures) {}
+
+  std::vector<Item> list(const std::string& uid, Folder folder) override {
+    const bool named = folder == Folder::kNamed;
+    std::vector<Item> items;
+    connection_.run([&](pqxx::work& transaction) {
+      items.clear();
+      for (const auto& row :
+           transaction.exec_params("SELECT name, length(content) FROM weft.snapshot WHERE uid = $1 "
+                                   "AND starts_with(name, 'named/') = $2",
+                                   uid, named)) {
+        items.push_back({row[0].as<std::string>().substr(named ? 6 : 0), number_of(row[1])});
+      }
+    });
+    return items;
+  }
+
+  void write(const std::string& uid, const std::string& name, const std::string& bytes) override {
+    const Tenure tenure = tenures_.of(uid);
+    std::size_t written = 0;
+    connection_.run([&](pqxx::work& transaction) {
+      written =
+          transaction.exec_prepared("write", uid, name, binary(bytes), tenure.owner, tenure.epoch)
+              .affected_rows();
+    });
+    if (written == 0) throw StoreError("the session is another server's now, or deleted");
+  }
+
+  std::string read(const std::string& uid, const std::string& name) override {
+    std::optional<std::string> content;
+    connection_.run([&](pqxx::work& transaction) {
+      const auto rows = transaction.exec_params(
+          "SELECT content FROM weft.snapshot WHERE uid = $1 AND name = $2", uid, name);
+      if (!rows.empty()) content = bytes_of(rows[0][0]);
+    });
+    if (!content) throw StoreError("it is gone");
+    return *content;
+  }
+
+  void remove(const std::string& uid, const std::string& name) override try {
+    const Tenure tenure = tenures_.of(uid);
+    connection_.run([&](pqxx::work& transaction) {
+      transaction.exec_params(
+          "DELETE FROM weft.snapshot n USING weft.session s WHERE n.uid = $1 AND n.name = $2 "
+          "AND s.uid = $1 AND s.owner = $3 AND s.epoch = $4",
+          uid, name, tenure.owner, tenure.epoch);
+    });
+  } catch (const StoreError& error) {
+    spdlog::warn("{} cannot be removed: {}", place_of(uid, name), error.what());
+  }
+
+  void remove_all(const std::string& /*uid*/) override {}  // they go with their session
+
+  std::string place_of(const std::string& uid, const std::string& name) const override {
+    return "snapshot " + name + " of session " + uid + " in " + connection_.place();
+  }
+
+ private:
+  PostgresConnection connection_;
+  const Tenures& tenures_;
+};
+
+// Work on a session that is another server's now changes nothing, and says so.
+class PostgresStore final : public SessionStore {
+ public:
+  PostgresStore(const std::string& url, std::string replica)
+      : replica_(std::move(replica)),
+        log_(url, kLogStatements),
+        calls_(url),
+        lease_(url),
+        snapshots_(std::make_unique<SnapshotTable>(url, tenures_)) {}
+  ~PostgresStore() override;
+
+  LeftBehind load() override;
+  void add(const KeptSession& session, const Request& creation,
+           const SessionSnapshot* beginning) override;
+  SessionSnapshot named_snapshot(const std::string& uid, const std::string& id) override {
+    return snapshots_.read(uid, id);
+  }
+  std::optional<SessionSnapshot> snapshot(const std::string& uid,
+                                          const SessionPast& past) override {
+    return snapshots_.read(uid, past.reach.history_from, past.first);
+  }
+  std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t entries) override;
+  void erase(const std::string& uid, const Request& deletion,
+             const SessionLog::Written& written) override;
+
+  bool is_shared() const override { return true; }
+  Claim claim(const std::string& id) override;
+  std::vector<ListedSession> list(const std::string& after, std::size_t count,
+                                  const std::optional<std::string>& owner) override;
+  std::optional<CarriedOut> find_request(const std::string& id) override;
+  void watch(Watch watch) override;
+  void leave() override;
+
+ private:
+  class Log;
+  // What is done of one session; false where it is not this server's.
+  using Work = std::function<bool(pqxx::work&)>;
+  struct Job {
+    std::string uid;
+    Work work;
+    SessionLog::Written written;
+  };
+
+  static void keep_request(pqxx::work& transaction, const Request& request, const std::string& uid);
+  static LeftSession read_session(pqxx::work& transaction, const std::string& uid,
+                                  const std::string& id, const records::Row& progress);
+  void post(const std::string& uid, Work work, SessionLog::Written written);
+  void work();
+  void commit(std::deque<Job> jobs);
+  void finish(const Job& job, const std::string& error, bool own);
+  void lose(const std::string& uid);
+  bool pause(milliseconds time);
+
+  bool renew();
+  void look_for_losses();
+  void look_for_orphans();
+  void keep_lease();
+
+  const std::string replica_;
+  std::int64_t number_ = 0;  // of this process among all replicas
+  Tenures tenures_;
+  PostgresConnection log_, calls_, lease_;
+  Snapshots snapshots_;
+
+  std::mutex mutex_;  // guards all below
+  std::condition_variable changed_;
+  std::deque<Job> jobs_;
+  bool stopping_ = false;
+  Watch watch_;
+  std::thread writer_, keeper_;
+};
+
+PostgresStore::~PostgresStore() {
+  {
+    std::lock_guard lock(mutex_);
+    stopping_ = true;
+    changed_.notify_all();
+  }
+  if (writer_.joinable()) writer_.join();
+  if (keeper_.joinable()) keeper_.join();
+}
+
+// False where the store is to stop.
+bool PostgresStore::pause(milliseconds time) {
+  std::unique_lock lock(mutex_);
+  return !changed_.wait_for(lock, time, [&] { return stopping_; });
+}
+
+LeftBehind PostgresStore::load() {
+  const int newest = static_cast<int>(std::size(postgres::kVersions));
+  calls_.run([&](pqxx::work& transaction) {
+    transaction.exec("SELECT pg_advisory_xact_lock(7311)");  // one server at a time
+    transaction.exec("CREATE SCHEMA IF NOT EXISTS weft");
+    transaction.exec("CREATE TABLE IF NOT EXISTS weft.version (number INT NOT NULL)");
+    const auto rows = transaction.exec("SELECT number FROM weft.version");
+    const int found = rows.empty() ? 0 : rows[0][0].as<int>();
+    if (found > newest) {
+      throw StoreError(calls_.place() + " has tables of a newer weftd, version " +
+                       std::to_string(found) + "; this one knows " + std::to_string(newest));
+    }
+    for (int i = found; i < newest; ++i) transaction.exec(postgres::kVersions[i]);
+    if (rows.empty()) transaction.exec("INSERT INTO weft.version VALUES (0)");
+    transaction.exec_params("UPDATE weft.version SET number = $1", newest);
+    number_ = number_of(transaction.exec1("SELECT nextval('weft.replica_number')")[0]);
+  });
+  renew();
+  writer_ = std::thread([this] { work(); });
+  return {};
+}
+
+void PostgresStore::keep_request(pqxx::work& transaction, const Request& request,
+                                 const std::string& uid) {
+  if (request.id.empty()) return;
+  const auto row = transaction.exec_params1(
+      "INSERT INTO weft.request VALUES ($1, $2, $3) "
+      "ON CONFLICT (id) DO UPDATE SET id = excluded.id RETURNING uid",
+      request.id, static_cast<std::int64_t>(request.checksum), uid);
+  if (row[0].as<std::string>() != uid)
+    throw StoreError("another server carries out the same request; send it again");
+}
+
+void PostgresStore::add(const KeptSession& session, const Request& creation,
+                        const SessionSnapshot* beginning) {
+  const std::string& uid = session.identity.uid;
+  records::Progress come;
+  if (beginning != nullptr) {
+    come.entries = beginning->entries;
+    come.reach.frame = beginning->simulation.frame;
+  }
+  const std::string record = records::encode(session), progress = records::encode(come);
+  calls_.run([&](pqxx::work& transaction) {
+    keep_request(transaction, creation, uid);
+    transaction.exec_params(
+        "INSERT INTO weft.session VALUES ($1, $2, $3, $4, 1, $5, $6) ON CONFLICT DO NOTHING", uid,
+        session.identity.id, session.identity.owner, number_, binary(progress),
+        static_cast<std::int64_t>(checksum(uid, progress)));
+    const auto row = transaction.exec_params1(
+        "SELECT uid, principal FROM weft.session WHERE id = $1", session.identity.id);
+    if (row[0].as<std::string>() != uid) throw SessionExists(row[1].as<std::string>());
+    transaction.exec_params("INSERT INTO weft.scene VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
+                            uid, binary(record), static_cast<std::int64_t>(checksum(uid, record)));
+  });
+  tenures_.set(uid, {number_, 1});
+  if (beginning == nullptr) return;
+  try {
+    snapshots_.begin(uid, *beginning);
+  } catch (const StoreError&) {
+    erase(uid, {}, [](const std::string&) {});
+    throw;
+  }
+}
+
+void PostgresStore::erase(const std::string& uid, const Request& deletion,
+                          const SessionLog::Written& written) {
+  const Tenure tenure = tenures_.of(uid);
+  post(
+      uid,
+      [uid, deletion, tenure](pqxx::work& transaction) {
+        transaction.exec_params(
+            "DELETE FROM weft.session WHERE uid = $1 AND owner = $2 AND epoch = $3", uid,
+            tenure.owner, tenure.epoch);
+        const auto left = transaction.exec_params("SELECT FROM weft.session WHERE uid = $1", uid);
+        if (left.empty()) keep_request(transaction, deletion, uid);
+        return left.empty();
+      },
+      [this, uid, written](const std::string& error) {
+        if (error.empty()) tenures_.erase(uid);
+        written(error);
+      });
+}
+
+class PostgresStore::Log final : public SessionLog {
+ public:
+  Log(PostgresStore& store, std::string uid, std::int64_t entries)
+      : store_(store), uid_(std::move(uid)), entries_(std::make_shared<std::int64_t>(entries)) {}
+
+  void write(const std::optional<LogEntry>& entry, const Reach& reach,
+             const Written& written) override {
+    // the count is the writing thread's own
+    const auto record = entry ? std::optional(records::encode(*entry)) : std::nullopt;
+    store_.post(
+        uid_,
+        [record, reach, uid = uid_, tenure = store_.tenures_.of(uid_),
+         entries = entries_](pqxx::work& transaction) {
+          const std::string progress =
+              records::encode(records::Progress{*entries + (record ? 1 : 0), reach});
+          const bool own =
+              transaction
+                  .exec_prepared("progress", uid, tenure.owner, tenure.epoch, binary(progress),
+                                 static_cast<std::int64_t>(checksum(uid, progress)))
+                  .affected_rows() == 1;
+          if (own && record) {
+            transaction.exec_prepared(
+                "entry", uid, *entries, binary(*record),
+                static_cast<std::int64_t>(checksum(entry_key(uid, *entries), *record)));
+          }
+          return own;
+        },
+        [entries = entries_, added = record.has_value(), written](const std::string& error) {
+          if (error.empty() && added) ++*entries;
+          written(error);
+        });
+  }
+
+  bool offer(const Take& take, std::int64_t oldest) override {
+    const auto forget = [&store = store_, uid = uid_](std::int64_t entries) {
+      store.post(
+          uid,
+          [uid, entries, tenure = store.tenures_.of(uid)](pqxx::work& transaction) {
+            transaction.exec_params(
+                "DELETE FROM weft.entry e USING weft.session s WHERE e.uid = $1 AND e.number < $2 "
+                "AND s.uid = $1 AND s.owner = $3 AND s.epoch = $4 AND $2 >= $5 + "
+                "(SELECT min(number) FROM weft.entry WHERE uid = $1)",
+                uid, entries, tenure.owner, tenure.epoch, kFewEntries);
+            return true;
+          },
+          [](const std::string&) {});
+    };
+    return store_.snapshots_.write(uid_, take, oldest, forget);
+  }
+
+  void keep(const std::string& id, std::shared_ptr<const SessionSnapshot> snapshot,
+            const Kept& kept) override {
+    store_.snapshots_.keep(uid_, id, std::move(snapshot), kept);
+  }
+  void drop(const std::string& id) override { store_.snapshots_.drop(uid_, id); }
+
+ private:
+  PostgresStore& store_;
+  const std::string uid_;
+  const std::shared_ptr<std::int64_t> entries_;  // of the log
+};
+
+std::unique_ptr<SessionLog> PostgresStore::log_of(const std::string& uid, std::int64_t entries) {
+  return std::make_unique<Log>(*this, uid, entries);
+}
+
+void PostgresStore::post(const std::string& uid, Work work, SessionLog::Written written) {
+  std::lock_guard lock(mutex_);
+  jobs_.push_back({uid, std::move(work), std::move(written)});
+  changed_.notify_all();
+}
+
+void PostgresStore::work() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
+    if (jobs_.empty()) return;
+    auto jobs = std::exchange(jobs_, {});
+    lock.unlock();
+    commit(std::move(jobs));
+    lock.lock();
+  }
+}
+
+// While the database is away its work waits: what became of the last of it is not known, and all of
+// it may be done again.
+void PostgresStore::commit(std::deque<Job> jobs) {
+  std::vector<bool> own;
+  for (milliseconds time = kFirstPause;; time = std::min(2 * time, kLongestPause)) try {
+      log_.run([&](pqxx::work& transaction) {
+        own.clear();
+        for (const Job& job : jobs) own.push_back(job.work(transaction));
+      });
+      for (std::size_t i = 0; i < jobs.size(); ++i) finish(jobs[i], {}, own[i]);
+      return;
+    } catch (const StoreLost& error) {
+      if (time == kFirstPause) spdlog::warn("{}; changes wait", error.what());
+      if (pause(time)) continue;
+      for (const Job& job : jobs) finish(job, error.what(), true);
+      return;
+    } catch (const StoreError& error) {
+      if (jobs.size() > 1) break;
+      spdlog::error("{}", error.what());
+      return finish(jobs.front(), error.what(), true);
+    }
+  for (Job& job : jobs) commit({std::move(job)});
+}
+
+void PostgresStore::finish(const Job& job, const std::string& error, bool own) {
+  if (!own) lose(job.uid);
+  job.written(own ? error : "another server has the session");
+}
+
+// Another server has it, or none.
+void PostgresStore::lose(const std::string& uid) {
+  if (!tenures_.erase(uid)) return;
+  std::function<void(const std::string&)> taken;
+  {
+    std::lock_guard lock(mutex_);
+    taken = watch_.taken;
+  }
+  if (taken) taken(uid);
+}
+
+LeftSession PostgresStore::read_session(pqxx::work& transaction, const std::string& uid,
+                                        const std::string& id, const records::Row& progress) {
+  const auto scene =
+      transaction.exec_params("SELECT record, checksum FROM weft.scene WHERE uid = $1", uid);
+  if (scene.empty()) throw StoreError("its scene is missing");
+  std::vector<records::NumberedRow> entries;
+  for (const auto& row : transaction.exec_params(
+           "SELECT number, record, checksum FROM weft.entry WHERE uid = $1 ORDER BY number", uid)) {
+    entries.push_back({{bytes_of(row[1]), number_of(row[2])}, number_of(row[0])});
+  }
+  return records::assemble(uid, id, {bytes_of(scene[0][0]), number_of(scene[0][1])}, progress,
+                           entries);
+}
+
+Claim PostgresStore::claim(const std::string& id) {
+  Claim claim;
+  Tenure tenure;
+  std::string uid;
+  calls_.run([&](pqxx::work& transaction) {
+    claim = {};
+    uid.clear();
+    const auto taken = transaction.exec_params(
+        "UPDATE weft.session SET owner = $2, epoch = epoch + 1 "
+        "WHERE id = $1 AND (owner = $2 OR NOT weft.holds(owner, $2)) "
+        "RETURNING uid, epoch, progress, checksum",
+        id, number_);
+    if (taken.empty()) {
+      const auto rows = transaction.exec_params(
+          "SELECT s.principal, coalesce(r.name, '') FROM weft.session s "
+          "LEFT JOIN weft.replica r ON r.number = s.owner WHERE s.id = $1",
+          id);
+      if (!rows.empty())
+        claim = Elsewhere{rows[0][1].as<std::string>(), rows[0][0].as<std::string>()};
+      return;
+    }
+    uid = taken[0][0].as<std::string>();
+    tenure = {number_, number_of(taken[0][1])};
+    try {
+      claim = read_session(transaction, uid, id, {bytes_of(taken[0][2]), number_of(taken[0][3])});
+    } catch (const StoreError& error) {
+      claim = DamagedSession{id, uid, error.what()};
+    }
+  });
+  if (uid.empty()) return claim;
+  tenures_.set(uid, tenure);
+  if (auto* left = std::get_if<LeftSession>(&claim))
+    left->past.named = snapshots_.named(uid, left->past.entries());
+  return claim;
+}
+
+std::vector<ListedSession> PostgresStore::list(const std::string& after, std::size_t count,
+                                               const std::optional<std::string>& owner) {
+  std::vector<ListedSession> sessions;
+  calls_.run([&](pqxx::work& transaction) {
+    sessions.clear();
+    // ids are ASCII, and ordered as this program orders them
+    for (const auto& row : transaction.exec_params(
+             "SELECT c.record, c.checksum, s.uid, coalesce(r.name, '') FROM weft.session s "
+             "JOIN weft.scene c USING (uid) LEFT JOIN weft.replica r ON r.number = s.owner "
+             "WHERE s.id COLLATE \"C\" > $1 AND ($2 OR s.principal = $3) "
+             "ORDER BY s.id COLLATE \"C\" LIMIT $4",
+             after, !owner, owner.value_or(""), static_cast<std::int64_t>(count))) {
+      const std::string record = bytes_of(row[0]);
+      if (checksum(row[2].as<std::string>(), record) != number_of(row[1])) continue;
+      sessions.push_back({records::decode_session(record), row[3].as<std::string>()});
+    }
+  });
+  return sessions;
+}
+
+std::optional<CarriedOut> PostgresStore::find_request(const std::string& id) {
+  std::optional<CarriedOut> found;
+  if (id.empty()) return found;
+  calls_.run([&](pqxx::work& transaction) {
+    found.reset();
+    const auto rows = transaction.exec_params(
+        "SELECT r.checksum, r.uid, coalesce(s.id, '') FROM weft.request r "
+        "LEFT JOIN weft.session s USING (uid) WHERE r.id = $1",
+        id);
+    if (rows.empty()) return;
+    const auto crc = static_cast<std::uint32_t>(number_of(rows[0][0]));
+    found = CarriedOut{{{id, crc}, rows[0][1].as<std::string>()}, rows[0][2].as<std::string>()};
+  });
+  return found;
+}
+
+void PostgresStore::watch(Watch watch) {
+  {
+    std::lock_guard lock(mutex_);
+    watch_ = std::move(watch);
+  }
+  keeper_ = std::thread([this] { keep_lease(); });
+}
+
+// True where there was a gap: others may have taken sessions over.
+bool PostgresStore::renew() {
+  bool gap = true;
+  lease_.run([&](pqxx::work& transaction) {
+    const auto renewed = transaction.exec_params(
+        "WITH before AS (SELECT lease_until < now() AS gap FROM weft.replica WHERE number = $1 "
+        "FOR UPDATE) UPDATE weft.replica SET pid = pg_backend_pid(), backend_start = (SELECT "
+        "backend_start FROM pg_stat_activity WHERE pid = pg_backend_pid()), renewed = now(), "
+        "lease_until = now() + $2 * INTERVAL '1 ms', since = CASE WHEN gap THEN now() ELSE since "
+        "END FROM before WHERE number = $1 RETURNING gap",
+        number_, static_cast<std::int64_t>(kLease.count()));
+    gap = renewed.empty() || renewed[0][0].as<bool>();
+    if (!renewed.empty()) return;
+    transaction.exec_params(
+        "INSERT INTO weft.replica SELECT $1::bigint, $2::text, pid, backend_start, now(), "
+        "now() + $3 * INTERVAL '1 ms', now() FROM pg_stat_activity WHERE pid = pg_backend_pid()",
+        number_, replica_, static_cast<std::int64_t>(kLease.count()));
+  });
+  return lease_.is_new() || gap;
+}
+
+void PostgresStore::look_for_losses() {
+  std::set<std::string> missing = tenures_.uids();
+  lease_.run([&](pqxx::work& transaction) {
+    for (const auto& row :
+         transaction.exec_params("SELECT uid FROM weft.session WHERE owner = $1", number_))
+      missing.erase(row[0].as<std::string>());
+  });
+  for (const std::string& uid : missing) lose(uid);
+}
+
+void PostgresStore::look_for_orphans() {
+  std::vector<std::string> ids;
+  lease_.run([&](pqxx::work& transaction) {
+    ids.clear();
+    for (const auto& row : transaction.exec_params(
+             "SELECT s.id FROM weft.replica r JOIN weft.session s ON s.owner = r.number "
+             "WHERE r.number <> $1 AND NOT weft.holds(r.number, $1) ORDER BY random() LIMIT $2",
+             number_, kOrphans))
+      ids.push_back(row[0].as<std::string>());
+    transaction.exec(
+        "DELETE FROM weft.replica r WHERE lease_until < now() - INTERVAL '1 hour' "
+        "AND NOT EXISTS (SELECT FROM weft.session WHERE owner = r.number)");
+    transaction.exec("DELETE FROM weft.request WHERE carried_out < now() - INTERVAL '24 hours'");
+  });
+  for (const std::string& id : ids) watch_.orphaned(id);
+}
+
+void PostgresStore::keep_lease() {
+  bool reached = true, gap = false;
+  while (pause(kRenewal)) try {
+      gap = renew() || gap;
+      if (gap) look_for_losses();
+      gap = false;
+      look_for_orphans();
+      if (!std::exchange(reached, true)) spdlog::info("{} is back", lease_.place());
+    } catch (const StoreError& error) {
+      if (std::exchange(reached, false)) spdlog::warn("{}", error.what());
+    }
+}
+
+void PostgresStore::leave() {
+  {
+    std::lock_guard lock(mutex_);
+    stopping_ = true;
+    changed_.notify_all();
+  }
+  if (keeper_.joinable()) keeper_.join();
+  if (writer_.joinable()) writer_.join();
+  try {
+    lease_.run([&](pqxx::work& transaction) {
+      transaction.exec_params(
+          "UPDATE weft.replica SET pid = 0, renewed = now(), lease_until = now() WHERE number = $1",
+          number_);
+    });
+  } catch (const StoreError& error) {
+    spdlog::warn("{}; other servers take over when the lease has run out", error.what());
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<SessionStore> open_postgres_store(const std::string& url,
+                                                  const std::string& replica) {
+  return std::make_unique<PostgresStore>(url, replica);
+}
+
+}  // namespace weft

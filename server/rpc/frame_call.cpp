@@ -36,7 +36,7 @@ bool FrameCall::begin(const grpc::ServerContextBase& context) {
 void FrameCall::find(const std::string& name, const std::string& uid, const v1::FrameFormat& format,
                      std::vector<Problem> problems) {
   name_ = name;
-  format_ = with_defaults(format);
+  format_ = format;
   if (const auto found = find_here(backend_, caller_.caller, name, "session")) {
     if (const auto status = take(*found, uid, std::move(problems)); !status.ok()) end(status);
     return;
@@ -63,7 +63,9 @@ grpc::Status FrameCall::take(const FoundSession& found, const std::string& uid,
   for (auto& problem : find_problems(format_, particles, backend_.limits.max_frame_bytes)) {
     problems.push_back(std::move(problem));
   }
-  return problems.empty() ? open() : errors::field_invalid(problems);
+  if (!problems.empty()) return errors::field_invalid(problems);
+  format_ = with_defaults(format_);
+  return open();
 }
 
 void FrameCall::subscribe(std::optional<std::int64_t> start, SlowReader policy) {

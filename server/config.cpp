@@ -47,6 +47,10 @@ std::vector<Number> numbers(Config& config) {
        "Streams of one principal at a time"},
       {"max_snapshots_per_session", &limits.max_snapshots_per_session, 1, 1000,
        "Snapshots on demand of one session"},
+      {"idle_s", &config.idle_s, 0, 31'536'000,
+       "Seconds after which a paused session that nobody used is kept in the store alone, until it "
+       "is "
+       "named again; 0: never"},
       {"max_tests", &limits.max_tests, 1, 256, "Tests of textiles at a time"},
       {"history_bytes", &limits.history_bytes_per_session, kMiB, 1024 * kMiB * 64,
        "Bytes of frames that a session keeps for its streams"},
@@ -274,6 +278,7 @@ Config read_config(int argc, const char* const* argv) {
   for (std::size_t i = 0; i < known_texts.size(); ++i)
     if (app.count(flag_of(known_texts[i].key)) > 0) *known_texts[i].target = given_texts[i];
   config.insecure |= insecure;
+  config.server.idle = std::chrono::seconds(config.idle_s);
   set_tls(config, tls);
   if (config.server.metrics) check_metrics(config);
   if (config.server.data_dir->empty()) refuse("data_dir is empty; give a directory, or none");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "server/server.h"
@@ -9,6 +10,7 @@ namespace weft {
 // What weftd was told to do.
 struct Config {
   ServerOptions server;
+  std::int64_t idle_s = 3600;
   bool insecure = false;  // may listen beyond this machine, without encryption
   std::string log_level = "info";
 };

@@ -5,6 +5,9 @@
 #include <unistd.h>
 
 #include <array>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
 #include <stdexcept>
 
 #include "server/rpc/backend.h"
@@ -68,6 +71,17 @@ std::unique_ptr<SessionStore> open_store(const ServerOptions& options) {
   return options.data_dir ? open_sqlite_store(*options.data_dir) : make_no_store();
 }
 
+// Until it is told to stop.
+void retire(const std::stop_token& stop, Backend& backend, std::chrono::milliseconds idle) {
+  std::mutex mutex;
+  std::condition_variable_any never;
+  std::unique_lock lock(mutex);
+  while (!stop.stop_requested()) {
+    never.wait_for(lock, stop, idle / 8, [] { return false; });
+    if (!stop.stop_requested()) retire_sessions(backend, idle);
+  }
+}
+
 }  // namespace
 
 struct Server::Parts {
@@ -85,6 +99,7 @@ struct Server::Parts {
   LabService lab{backend};
   std::unique_ptr<grpc::Server> grpc;
   std::optional<Metrics> metrics;
+  std::jthread retirement;
   bool stopped = false;
 };
 
@@ -117,6 +132,8 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
            backend->registry.erase(session, Refusal::Why::kTaken);
        },
        [backend = &parts_->backend](const std::string& id) { adopt_session(*backend, id); }});
+  if (options.idle.count() > 0 && (options.database || options.data_dir))
+    parts_->retirement = std::jthread(retire, std::ref(parts_->backend), options.idle);
   for (const char* service : kServices) {
     parts_->grpc->GetHealthCheckService()->SetServingStatus(service, true);
   }
@@ -152,6 +169,7 @@ void Server::stop(std::chrono::milliseconds deadline) {
   if (!parts_->grpc || std::exchange(parts_->stopped, true)) return;
   parts_->grpc->GetHealthCheckService()->Shutdown();  // NOT_SERVING
   parts_->backend.draining = true;
+  parts_->retirement.request_stop();
 
   // end every call ourselves, and let the answers leave: gRPC would wait for ever, or drop them
   const auto end = Clock::now() + deadline;

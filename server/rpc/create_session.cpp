@@ -61,8 +61,8 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
   if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
   const auto& who = std::get<Caller>(caller);
   // what a full server refuses does not wait for the plans of others
-  const auto status = refusal(who, *request, request->session_id());
-  if (!status.ok()) return answer(context, status);
+  if (const auto status = refusal(who, *request, request->session_id()); !status.ok())
+    return answer(context, status);
   return create_later(response, [this, who, request = *request](v1::Session& session) {
     return create(who, request, session);
   });

@@ -247,7 +247,8 @@ grpc::Status store_unreachable(const std::string& why) {
 
 grpc::Status wrong_replica(const std::string& name, const std::string& replica) {
   auto status = make(grpc::StatusCode::UNAVAILABLE, "WRONG_REPLICA",
-                     name + " is with another server" + (replica.empty() ? "" : ", " + replica),
+                     name + (replica.empty() ? " is not with this server any more; ask again"
+                                             : " is with another server, " + replica),
                      {{"replica", replica}});
   add_retry(status, kRetryElsewhere);
   return to_grpc(status);

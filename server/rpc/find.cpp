@@ -2,6 +2,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include <cstddef>
+#include <limits>
+#include <mutex>
 #include <utility>
 
 #include "server/rpc/errors.h"
@@ -30,7 +33,7 @@ std::optional<FoundSession> find_here(const Backend& backend, const Caller& call
                                             "0-9 and -, beginning with a letter");
   }
   const bool here = backend.registry.find(id) != nullptr || backend.registry.damaged(id);
-  if (!here && backend.store->is_shared()) return std::nullopt;
+  if (!here && backend.store->has_others()) return std::nullopt;
   return in_registry(backend.registry, caller, name);
 }
 
@@ -46,7 +49,7 @@ FoundSession find_anywhere(Backend& backend, const Caller& caller, const std::st
                                             : errors::session_not_yours(name);
   }
   if (auto* left = std::get_if<LeftSession>(&claim)) {
-    spdlog::info("{} is taken over", name);
+    if (backend.store->is_shared()) spdlog::info("{} is taken over", name);
     restore_session(backend, std::move(*left));
   } else if (const auto* damaged = std::get_if<DamagedSession>(&claim)) {
     add_damaged(backend, *damaged);
@@ -73,6 +76,19 @@ void find_elsewhere(Backend& backend, const Caller& caller, const std::string& n
 void adopt_session(Backend& backend, const std::string& id) {
   const Caller admin{"", true};
   find_elsewhere(backend, admin, session_name(id), [](const FoundSession&) {});
+}
+
+void retire_sessions(Backend& backend, std::chrono::duration<double> unused) {
+  for (const auto& session : backend.registry.list("", std::numeric_limits<std::size_t>::max())) {
+    const std::lock_guard one_at_a_time(backend.claiming);
+    if (!session->retire(unused)) continue;
+    try {
+      backend.store->let_go(session->identity());
+    } catch (const StoreError& error) {
+      spdlog::warn("{} cannot be let go: {}", session_name(session->id()), error.what());
+    }
+    backend.registry.erase(session, Refusal::Why::kTaken);
+  }
 }
 
 }  // namespace weft

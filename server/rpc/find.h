@@ -2,6 +2,7 @@
 
 #include <grpcpp/support/status.h>
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -32,5 +33,8 @@ void find_elsewhere(Backend& backend, const Caller& caller, const std::string& n
 
 // Takes over a session whose server died, in its turn.
 void adopt_session(Backend& backend, const std::string& id);
+
+// Leaves sessions that are paused and were not used for so long to the store alone.
+void retire_sessions(Backend& backend, std::chrono::duration<double> unused);
 
 }  // namespace weft

@@ -168,7 +168,7 @@ grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerConte
   if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
   const auto& who = std::get<Caller>(caller);
   if (const auto error = refusal_of(*request)) return answer(context, *error);
-  if (!backend_.store->is_shared()) {
+  if (!backend_.store->has_others()) {
     *response = list(who, *request);
     return answer(context, grpc::Status::OK);
   }
@@ -202,7 +202,7 @@ v1::ListSessionsResponse SessionService::list(const Caller& caller,
   return page_of(std::move(response), size);
 }
 
-// Those of other servers without where they are.
+// Those that are not here without what changes of them.
 v1::ListSessionsResponse SessionService::list_all(const Caller& caller,
                                                   const v1::ListSessionsRequest& request) const {
   const std::size_t size = page_size_of(request);
@@ -215,6 +215,7 @@ v1::ListSessionsResponse SessionService::list_all(const Caller& caller,
     v1::Session* session = response.add_sessions();
     *session = here ? to_proto(*here, StartValues::kLeftOut) : to_proto(kept.identity, kept.scene);
     session->set_replica(replica);
+    if (!here && replica.empty()) session->set_state(v1::SESSION_STATE_STORED);
   }
   return page_of(std::move(response), size);
 }

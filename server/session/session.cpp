@@ -104,7 +104,7 @@ SessionStatus Session::status() const {
 void Session::attend() {
   {
     std::lock_guard lock(mutex_);
-    attended_ = Clock::now();
+    attended_ = used_ = Clock::now();
     if (!release()) return;
   }
   wake();
@@ -114,6 +114,7 @@ void Session::submit(Command command) {
   std::optional<Refusal> refusal;
   {
     std::lock_guard lock(mutex_);
+    used_ = Clock::now();
     if (closed_) {
       refusal = refuse(*closed_);
     } else if (commands_.size() + steps_.size() >= kMaxCommands && !must_be_taken(command)) {
@@ -127,6 +128,16 @@ void Session::submit(Command command) {
   } else {
     wake();
   }
+}
+
+bool Session::retire(std::chrono::duration<double> unused) {
+  std::lock_guard lock(mutex_);
+  const bool busy = closed_ || state_ != SessionState::kPaused || !commands_.empty() ||
+                    !steps_.empty() || !subscriptions_.empty() || past_holders_ || writing_.then ||
+                    writing_.reach;
+  if (busy || Clock::now() - used_ < unused) return false;
+  closed_ = Refusal::Why::kTaken;
+  return true;
 }
 
 void Session::close(Refusal::Why why) {
@@ -627,6 +638,7 @@ void Session::compute_frame(Clock::time_point due) {
   {
     std::lock_guard lock(mutex_);
     if (closed_) return;
+    used_ = end;
     history_.push(frame, first_held_frame());
     if (simulation_.textile_changed()) {
       textiles_ = textiles_of(simulation_.scene());

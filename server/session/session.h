@@ -134,6 +134,10 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::unique_ptr<Subscription> subscribe(std::weak_ptr<FrameSink> sink,
                                           std::optional<std::int64_t> start, SlowReader policy);
 
+  // Ends it as one that is with no server now, where it is paused and was not used for so long;
+  // false where it is not so.
+  [[nodiscard]] bool retire(std::chrono::duration<double> unused);
+
   // Ends it: refuses every command, waiting and to come, with `why`, and ends subscriptions.
   void close(Refusal::Why why);
 
@@ -274,7 +278,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::vector<Subscription*> subscriptions_;
   bool held_ = false;  // idle until somebody comes, or a subscriber reads on
   Clock::time_point attended_;
-  std::vector<NamedSnapshot> named_;  // in order of frame
+  Clock::time_point used_ = Clock::now();  // a call, a frame, the end of a stream
+  std::vector<NamedSnapshot> named_;       // in order of frame
   Writing writing_;
   Reach reach_;                   // as it was written last
   std::int64_t ahead_ = 16;       // frames that the reach is put ahead

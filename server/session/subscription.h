@@ -41,7 +41,7 @@ struct Reading {
     kExpired,  // the next frame is no longer kept
     kFailed,   // there will be no next frame
     kDeleted,
-    kTaken,  // by another server
+    kTaken,  // by another server, or the store alone
   };
   Kind kind = Kind::kNothingYet;
   std::shared_ptr<const Frame> frame;  // of kFrame

@@ -173,7 +173,9 @@ class PostgresStore final : public SessionStore {
              const SessionLog::Written& written) override;
 
   bool is_shared() const override { return true; }
+  bool has_others() const override { return true; }
   Claim claim(const std::string& id) override;
+  bool let_go(const SessionIdentity& identity) override;
   std::vector<ListedSession> list(const std::string& after, std::size_t count,
                                   const std::optional<std::string>& owner) override;
   std::optional<CarriedOut> find_request(const std::string& id) override;
@@ -490,6 +492,18 @@ Claim PostgresStore::claim(const std::string& id) {
   if (auto* left = std::get_if<LeftSession>(&claim))
     left->past.named = snapshots_.named(uid, left->past.entries());
   return claim;
+}
+
+bool PostgresStore::let_go(const SessionIdentity& identity) {
+  const std::string& uid = identity.uid;
+  const Tenure tenure = tenures_.of(uid);
+  calls_.run([&](pqxx::work& transaction) {
+    transaction.exec_params(
+        "UPDATE weft.session SET owner = 0 WHERE uid = $1 AND owner = $2 AND epoch = $3", uid,
+        tenure.owner, tenure.epoch);
+  });
+  tenures_.erase(uid);
+  return true;
 }
 
 std::vector<ListedSession> PostgresStore::list(const std::string& after, std::size_t count,

@@ -18,7 +18,7 @@ inline constexpr const char* kVersions[] = {R"(
     uid TEXT PRIMARY KEY,
     id TEXT NOT NULL UNIQUE,
     principal TEXT NOT NULL,
-    owner BIGINT NOT NULL,                -- number of the replica that has it
+    owner BIGINT NOT NULL,                -- number of the replica that has it; 0: none
     epoch BIGINT NOT NULL,                -- one more with each owner; every write names its own
     progress BYTEA NOT NULL,              -- weft.storage.v1.KeptProgress
     checksum BIGINT NOT NULL              -- CRC-32 of uid and progress

@@ -8,6 +8,7 @@
 #include <deque>
 #include <filesystem>
 #include <future>
+#include <map>
 #include <mutex>
 #include <set>
 #include <thread>
@@ -113,6 +114,12 @@ class SqliteStore final : public SessionStore {
   void erase(const std::string& uid, const Request& deletion,
              const SessionLog::Written& written) override;
 
+  bool has_others() const override;
+  Claim claim(const std::string& id) override;
+  bool let_go(const SessionIdentity& identity) override;
+  std::vector<ListedSession> list(const std::string& after, std::size_t count,
+                                  const std::optional<std::string>& owner) override;
+
  private:
   class Log;
   using Work = std::function<void(SQLite::Database&)>;
@@ -127,15 +134,17 @@ class SqliteStore final : public SessionStore {
   LeftSession load_session(const std::string& uid, const std::string& id,
                            const records::Row& session);
   void post(Work work, SessionLog::Written written);
+  void carry_out(Work work);
   void work();
   std::string commit(const std::deque<Job>& jobs);
 
   const std::string path_;
   SQLite::Database database_;  // used by load(), then by the thread alone
-  std::mutex mutex_;
+  mutable std::mutex mutex_;   // guards all below but the thread
   std::condition_variable changed_;
   std::deque<Job> jobs_;
   bool stopping_ = false;
+  std::map<std::string, SessionIdentity> let_go_;  // sessions that the server has not, by id
   std::thread thread_;
   std::unique_ptr<SnapshotFiles> make_shelf() {
     const auto directory = std::filesystem::path(path_).replace_filename("snapshots");
@@ -224,33 +233,33 @@ LeftSession SqliteStore::load_session(const std::string& uid, const std::string&
 
 void SqliteStore::add(const KeptSession& session, const Request& creation,
                       const SessionSnapshot* beginning) {
-  std::promise<std::string> done;
   const std::string& uid = session.identity.uid;
+  {
+    std::lock_guard lock(mutex_);
+    const auto there = let_go_.find(session.identity.id);
+    if (there != let_go_.end()) throw SessionExists(there->second.owner);
+  }
   records::Progress come;
   if (beginning != nullptr) {
     snapshots_.begin(uid, *beginning);
     come.entries = beginning->entries;
     come.reach.frame = beginning->simulation.frame;
   }
-  post(
-      [&, record = records::encode(session),
-       progress = records::encode(come)](SQLite::Database& database) {
-        SQLite::Statement insert(database, "INSERT INTO session VALUES (?, ?, ?, ?)");
-        insert.bind(1, uid);
-        insert.bind(2, session.identity.id);
-        insert.bind(3, record.data(), static_cast<int>(record.size()));
-        insert.bind(4, checksum(uid, record));
-        insert.exec();
-        SQLite::Statement begin(database, "INSERT INTO progress VALUES (?, ?, ?)");
-        begin.bind(1, uid);
-        begin.bind(2, progress.data(), static_cast<int>(progress.size()));
-        begin.bind(3, checksum(uid, progress));
-        begin.exec();
-        keep_request(database, creation, uid);
-      },
-      [&](const std::string& error) { done.set_value(error); });
-  const std::string error = done.get_future().get();
-  if (!error.empty()) throw StoreError(error);
+  carry_out([&, record = records::encode(session),
+             progress = records::encode(come)](SQLite::Database& database) {
+    SQLite::Statement insert(database, "INSERT INTO session VALUES (?, ?, ?, ?)");
+    insert.bind(1, uid);
+    insert.bind(2, session.identity.id);
+    insert.bind(3, record.data(), static_cast<int>(record.size()));
+    insert.bind(4, checksum(uid, record));
+    insert.exec();
+    SQLite::Statement begin(database, "INSERT INTO progress VALUES (?, ?, ?)");
+    begin.bind(1, uid);
+    begin.bind(2, progress.data(), static_cast<int>(progress.size()));
+    begin.bind(3, checksum(uid, progress));
+    begin.exec();
+    keep_request(database, creation, uid);
+  });
 }
 
 void SqliteStore::erase(const std::string& uid, const Request& deletion,
@@ -360,6 +369,65 @@ class SqliteStore::Log final : public SessionLog {
 
 std::unique_ptr<SessionLog> SqliteStore::log_of(const std::string& uid, std::int64_t entries) {
   return std::make_unique<Log>(*this, uid, entries);
+}
+
+bool SqliteStore::has_others() const {
+  std::lock_guard lock(mutex_);
+  return !let_go_.empty();
+}
+
+bool SqliteStore::let_go(const SessionIdentity& identity) {
+  std::lock_guard lock(mutex_);
+  return let_go_.emplace(identity.id, identity).second;
+}
+
+Claim SqliteStore::claim(const std::string& id) {
+  std::string uid;
+  {
+    std::lock_guard lock(mutex_);
+    const auto found = let_go_.find(id);
+    if (found == let_go_.end()) return {};
+    uid = found->second.uid;
+  }
+  Claim claim;
+  carry_out([&](SQLite::Database& database) {
+    SQLite::Statement row(database, "SELECT record, checksum FROM session WHERE uid = ?");
+    row.bind(1, uid);
+    try {
+      if (!row.executeStep()) throw StoreError("it is gone");
+      claim = load_session(uid, id, {blob(row.getColumn(0)), row.getColumn(1).getInt64()});
+    } catch (const StoreError& error) {
+      claim = DamagedSession{id, uid, error.what()};
+    }
+  });
+  std::lock_guard lock(mutex_);
+  let_go_.erase(id);
+  return claim;
+}
+
+std::vector<ListedSession> SqliteStore::list(const std::string& after, std::size_t count,
+                                             const std::optional<std::string>& owner) {
+  std::vector<ListedSession> sessions;
+  carry_out([&](SQLite::Database& database) {
+    SQLite::Statement row(database,
+                          "SELECT uid, record, checksum FROM session WHERE id > ? ORDER BY id");
+    row.bind(1, after);
+    while (sessions.size() < count && row.executeStep()) {
+      const std::string record = blob(row.getColumn(1));
+      if (checksum(row.getColumn(0).getString(), record) != row.getColumn(2).getInt64()) continue;
+      KeptSession session = records::decode_session(record);
+      if (!owner || session.identity.owner == *owner) sessions.push_back({std::move(session), ""});
+    }
+  });
+  return sessions;
+}
+
+// Waits until the thread has done it.
+void SqliteStore::carry_out(Work work) {
+  std::promise<std::string> done;
+  post(std::move(work), [&](const std::string& error) { done.set_value(error); });
+  const std::string error = done.get_future().get();
+  if (!error.empty()) throw StoreError(error);
 }
 
 void SqliteStore::post(Work work, SessionLog::Written written) {

@@ -71,7 +71,7 @@ class StoreError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Another server has made a session of that name.
+// This server has no session of that name, but the store has.
 class SessionExists : public StoreError {
  public:
   explicit SessionExists(std::string principal)
@@ -89,7 +89,7 @@ class SessionStore {
 
   // Keeps a new session, made by `creation`, and waits until it is safe. It begins with its scene,
   // or at a snapshot that says to come after one entry of a log, which is forgotten. Throws
-  // StoreError; SessionExists where several servers share the store.
+  // StoreError.
   virtual void add(const KeptSession& session, const Request& creation,
                    const SessionSnapshot* beginning) = 0;
 
@@ -109,18 +109,26 @@ class SessionStore {
   virtual void erase(const std::string& uid, const Request& deletion,
                      const SessionLog::Written& written) = 0;
 
-  // What follows is for stores that several servers share, each session being one server's at a
-  // time. All of it waits for the store, and throws StoreError.
-  virtual bool is_shared() const { return false; }
+  // What follows is for sessions that the store has and this server has not. All of it waits for
+  // the store, and throws StoreError.
 
-  // A session that this server does not have, by its id; taken over where no living server has it.
+  // Whether there may be such.
+  virtual bool has_others() const { return false; }
+
+  // Such a session, by its id; taken over where no living server has it.
   virtual Claim claim(const std::string& /*id*/) { return {}; }
+
+  // Makes one such of a session that nothing is written of any more. False where that cannot be.
+  virtual bool let_go(const SessionIdentity& /*identity*/) { return false; }
 
   // In order of id, at most `count` of those after `after`; of one owner, or of all.
   virtual std::vector<ListedSession> list(const std::string& /*after*/, std::size_t /*count*/,
                                           const std::optional<std::string>& /*owner*/) {
     return {};
   }
+
+  // Whether several servers share the store, each session being one server's at a time.
+  virtual bool is_shared() const { return false; }
 
   // A creation or deletion that any of the servers carried out.
   virtual std::optional<CarriedOut> find_request(const std::string& /*id*/) { return {}; }

@@ -295,6 +295,20 @@ TEST_F(Fleet, TellsStreamsOfAnOldOwnerThatTheSessionIsElsewhere) {
   EXPECT_EQ(insist(*b, session).frame(), 3);
 }
 
+TEST_F(Fleet, HasASessionThatNobodyUsedWhereItIsNamedNext) {
+  ServerOptions idle = options("a");
+  idle.idle = milliseconds(100);
+  Service a(idle);
+  const auto b = server("b");
+  const v1::Session session = a.create(small_scene(), "curtain");
+  a.step(session, 12);
+  while (a.info().sessions() > 0) std::this_thread::sleep_for(milliseconds(5));
+  EXPECT_EQ(b->create_error(small_scene(), "curtain").code, grpc::StatusCode::ALREADY_EXISTS);
+  EXPECT_EQ(insist(*b, session).replica(), "b");
+  EXPECT_EQ(b->get(session).frame(), 12);
+  EXPECT_EQ(get_error(a, session).metadata("replica"), "b");
+}
+
 TEST_F(Fleet, CarriesANamedCallOutOnceWhicheverServerIsAsked) {
   auto a = server("a");
   const auto b = server("b");

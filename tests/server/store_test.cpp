@@ -32,6 +32,7 @@ class Restart : public ::testing::Test {
     options.data_dir = directory_.name();
     options.snapshot_ms = snapshot_ms_;
     options.limits.history_bytes_per_session = history_bytes_;
+    options.idle = idle_;
     service_ = std::make_unique<Service>(options);
   }
   void restart() {
@@ -69,6 +70,7 @@ class Restart : public ::testing::Test {
   }
   const TemporaryDirectory directory_;
   int snapshot_ms_ = 2000;
+  std::chrono::milliseconds idle_{0};
   std::int64_t history_bytes_ = 64 << 20;
   std::unique_ptr<Service> service_;
 };
@@ -93,6 +95,52 @@ TEST_F(Restart, HasEverySessionWhereItWasWithTheSameFrames) {
     service_->erase(session);
     EXPECT_EQ(shown.uid(), session.uid());
   }
+}
+
+TEST_F(Restart, KeepsASessionThatNobodyUsesInTheStoreAloneUntilItIsNamed) {
+  const auto wait_for = [&](std::int64_t sessions) {
+    while (service_->info().sessions() != sessions) std::this_thread::yield();
+  };
+  idle_ = std::chrono::milliseconds(100);
+  restart();
+  const v1::Session session = service_->create(small_scene(), "curtain");
+  service_->step(session, 12);
+  const auto before = frames(session, 12);
+  wait_for(0);
+  v1::ListSessionsResponse listed;
+  ASSERT_TRUE(service_->call(&Sessions::ListSessions, {}, &listed).ok());
+  ASSERT_THAT(listed.sessions(), SizeIs(1));
+  EXPECT_EQ(listed.sessions(0).uid(), session.uid());
+  EXPECT_EQ(listed.sessions(0).state(), v1::SESSION_STATE_STORED);
+  EXPECT_EQ(service_->create_error(small_scene(), "curtain").code,
+            grpc::StatusCode::ALREADY_EXISTS);
+  expect_equal(frames(session, 12), before);
+  service_->step(session, 1);
+  EXPECT_EQ(service_->get(session).frame(), 13);
+  wait_for(0);
+  restart();
+  EXPECT_EQ(service_->get(session).uid(), session.uid());
+  wait_for(0);
+  service_->erase(session);
+  v1::GetSessionRequest request;
+  request.set_name(session.name());
+  EXPECT_EQ(service_->error(&Sessions::GetSession, request).code, grpc::StatusCode::NOT_FOUND);
+}
+
+TEST_F(Restart, LeavesNoSessionToTheStoreThatRunsOrIsWatched) {
+  idle_ = std::chrono::milliseconds(50);
+  restart();
+  const v1::Session running = service_->create(), watched = service_->create();
+  Stream stream(*service_, frames_of(watched));
+  stream.frame();
+  v1::RunSessionRequest request;
+  request.set_name(running.name());
+  request.set_time_scale(1);
+  ASSERT_EQ(service_->error(&Sessions::RunSession, request).code, grpc::StatusCode::OK);
+  service_->create();
+  while (service_->info().sessions() > 2) std::this_thread::yield();
+  std::this_thread::sleep_for(4 * idle_);
+  EXPECT_EQ(service_->info().sessions(), 2);
 }
 
 TEST_F(Restart, GoesOnWithATextileThatIsChanging) {

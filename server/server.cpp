@@ -128,8 +128,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
   if (options.metrics) parts_->metrics.emplace(parts_->backend, *options.metrics);
   parts_->backend.store->watch(
       {[backend = &parts_->backend](const std::string& uid) {
-         if (const auto session = backend->registry.find_uid(uid))
-           backend->registry.erase(session, Refusal::Why::kTaken);
+         if (const auto session = backend->registry.find_uid(uid)) give_away(*backend, session);
        },
        [backend = &parts_->backend](const std::string& id) { adopt_session(*backend, id); }});
   if (options.idle.count() > 0 && (options.database || options.data_dir))
@@ -179,9 +178,9 @@ void Server::stop(std::chrono::milliseconds deadline) {
   parts_->backend.planner.drain();
   parts_->backend.store_calls.drain();
   parts_->lab.drain();
-  parts_->backend.store->leave();
   const bool ended = parts_->backend.calls.wait_for_none(end);
   parts_->grpc->Shutdown(std::chrono::system_clock::now() + (ended ? kGrace : kNoGrace));
+  parts_->backend.store->leave();  // last: a database may be slow
 }
 
 }  // namespace weft

@@ -17,8 +17,10 @@ namespace {
 FoundSession in_registry(const Registry& registry, const Caller& caller, const std::string& name) {
   const std::string id = id_of(name);
   if (auto session = registry.find(id); session && caller.may_use(*session)) return session;
-  if (!caller.is_admin) return errors::session_not_yours(name);
-  if (const auto damaged = registry.damaged(id)) return errors::session_damaged(name, damaged->why);
+  const auto damaged = registry.damaged(id);
+  const bool known = caller.is_admin || (damaged && damaged->owner == caller.principal);
+  if (!known) return errors::session_not_yours(name);
+  if (damaged) return errors::session_damaged(name, damaged->why);
   return errors::session_not_found(name);
 }
 
@@ -51,6 +53,7 @@ FoundSession find_anywhere(Backend& backend, const Caller& caller, const std::st
   if (auto* left = std::get_if<LeftSession>(&claim)) {
     if (backend.store->is_shared()) spdlog::info("{} is taken over", name);
     restore_session(backend, std::move(*left));
+    ++backend.stats.taken_over;
   } else if (const auto* damaged = std::get_if<DamagedSession>(&claim)) {
     add_damaged(backend, *damaged);
   }
@@ -87,8 +90,12 @@ void retire_sessions(Backend& backend, std::chrono::duration<double> unused) {
     } catch (const StoreError& error) {
       spdlog::warn("{} cannot be let go: {}", session_name(session->id()), error.what());
     }
-    backend.registry.erase(session, Refusal::Why::kTaken);
+    give_away(backend, session);
   }
+}
+
+void give_away(Backend& backend, const std::shared_ptr<Session>& session) {
+  if (backend.registry.erase(session, Refusal::Why::kTaken)) ++backend.stats.given_away;
 }
 
 }  // namespace weft

@@ -34,6 +34,9 @@ void find_elsewhere(Backend& backend, const Caller& caller, const std::string& n
 // Takes over a session whose server died, in its turn.
 void adopt_session(Backend& backend, const std::string& id);
 
+// Ends a session that is not this server's any more.
+void give_away(Backend& backend, const std::shared_ptr<Session>& session);
+
 // Leaves sessions that are paused and were not used for so long to the store alone.
 void retire_sessions(Backend& backend, std::chrono::duration<double> unused);
 

@@ -69,24 +69,29 @@ struct Metrics::Exposed : prometheus::Collectable {
 
   std::vector<MetricFamily> Collect() const override {
     const v1::ServerStats stats = server_stats(backend);
-    return {gauge("weft_uptime_seconds", "Since the server began", stats.uptime_s()),
-            sessions(stats.sessions()),
-            gauge("weft_streams", "Open streams", static_cast<double>(stats.streams())),
-            counter("weft_frames_total", "Frames computed", stats.frames()),
-            counter("weft_sleeping_frames_total", "Of them, without a substep",
-                    stats.sleeping_frames()),
-            counter("weft_substeps_total", "Substeps of all sessions", stats.substeps()),
-            counter("weft_particle_substeps_total", "Substeps times particles",
-                    stats.particle_substeps()),
-            counter("weft_repairs_total", "Frames computed again", stats.repairs()),
-            counter("weft_failures_total", "Sessions that failed", stats.failures()),
-            counter("weft_frames_sent_total", "Frames sent on streams", stats.frames_sent()),
-            counter("weft_bytes_sent_total", "Bytes of frame messages", stats.bytes_sent()),
-            counter("weft_slow_readers_total", "Streams that ended because they were too slow",
-                    stats.slow_readers()),
-            histogram("weft_frame_time_seconds", "Time to compute a frame", stats.frame_time_s()),
-            histogram("weft_lateness_seconds", "How late frames of paced sessions were",
-                      stats.lateness_s())};
+    return {
+        gauge("weft_uptime_seconds", "Since the server began", stats.uptime_s()),
+        sessions(stats.sessions()),
+        gauge("weft_streams", "Open streams", static_cast<double>(stats.streams())),
+        counter("weft_frames_total", "Frames computed", stats.frames()),
+        counter("weft_sleeping_frames_total", "Of them, without a substep",
+                stats.sleeping_frames()),
+        counter("weft_substeps_total", "Substeps of all sessions", stats.substeps()),
+        counter("weft_particle_substeps_total", "Substeps times particles",
+                stats.particle_substeps()),
+        counter("weft_repairs_total", "Frames computed again", stats.repairs()),
+        counter("weft_failures_total", "Sessions that failed", stats.failures()),
+        counter("weft_frames_sent_total", "Frames sent on streams", stats.frames_sent()),
+        counter("weft_bytes_sent_total", "Bytes of frame messages", stats.bytes_sent()),
+        counter("weft_slow_readers_total", "Streams that ended because they were too slow",
+                stats.slow_readers()),
+        counter("weft_sessions_taken_over_total",
+                "Sessions that came from another server or the store", stats.sessions_taken_over()),
+        counter("weft_sessions_given_away_total",
+                "Sessions that went to another server or the store", stats.sessions_given_away()),
+        histogram("weft_frame_time_seconds", "Time to compute a frame", stats.frame_time_s()),
+        histogram("weft_lateness_seconds", "How late frames of paced sessions were",
+                  stats.lateness_s())};
   }
 
   const Backend& backend;

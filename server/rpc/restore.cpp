@@ -14,14 +14,15 @@ namespace weft {
 
 void add_damaged(Backend& backend, const DamagedSession& damaged) {
   spdlog::error("{} is damaged: {}", session_name(damaged.id), damaged.why);
-  backend.registry.restore(damaged.id, {damaged.uid, damaged.why});
+  backend.registry.restore(damaged.id, {damaged.uid, damaged.why, damaged.owner});
 }
 
 void restore_session(Backend& backend, LeftSession left) {
   const SessionIdentity& identity = left.session.identity;
   Simulation simulation(std::move(left.session.scene));
   if (simulation.refusal()) {
-    return add_damaged(backend, {identity.id, identity.uid, "this version cannot step its scene"});
+    return add_damaged(
+        backend, {identity.id, identity.uid, "this version cannot step its scene", identity.owner});
   }
   if (identity.numerics_id != numerics_id()) {
     spdlog::warn("{} was created with numerics {}; its frames may differ in their last bits now",
@@ -39,7 +40,8 @@ void restore_session(Backend& backend, LeftSession left) {
     return add_damaged(backend,
                        {identity.id, identity.uid,
                         "no snapshot of it can be used, and its log does not reach back to "
-                        "frame 0"});
+                        "frame 0",
+                        identity.owner});
   }
   backend.registry.restore(session);
 }

@@ -47,6 +47,8 @@ v1::ServerStats server_stats(const Backend& backend) {
   result.set_frames_sent(stats.frames_sent);
   result.set_bytes_sent(stats.bytes_sent);
   result.set_slow_readers(stats.slow_readers);
+  result.set_sessions_taken_over(stats.taken_over);
+  result.set_sessions_given_away(stats.given_away);
   set(result.mutable_frame_time_s(), stats.frame_time);
   set(result.mutable_lateness_s(), stats.lateness);
   return result;

@@ -57,7 +57,8 @@ std::optional<Registry::Refused> Registry::refusal_locked(const std::string& id,
   if (closed_) return Closed{};
   if (const auto found = sessions_.find(id); found != sessions_.end())
     return Exists{found->second.session->owner()};
-  if (damaged_.contains(id)) return Exists{};
+  if (const auto found = damaged_.find(id); found != damaged_.end())
+    return Exists{found->second.owner.value_or("")};
   if (const auto excess = session_quota_.excess(owner, 1)) return *excess;
   if (const auto excess = particle_quota_.excess(owner, particles)) return *excess;
   return std::nullopt;

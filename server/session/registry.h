@@ -38,6 +38,7 @@ class Registry {
   struct Damaged {
     std::string uid;
     std::string why;
+    std::optional<std::string> owner;  // where that is known
   };
   void restore(const std::string& id, Damaged damaged);
   std::optional<Damaged> damaged(const std::string& id) const;

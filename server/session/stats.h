@@ -37,6 +37,8 @@ struct Stats {
   Count particle_substeps = 0;
   Count repairs = 0;
   Count failures = 0;
+  Count taken_over = 0;          // sessions, from the store or another server
+  Count given_away = 0;          // sessions, to the store or another server
   DurationHistogram frame_time;  // to compute a frame
   DurationHistogram lateness;    // of frames of paced sessions, against their time
 

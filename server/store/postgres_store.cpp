@@ -468,7 +468,7 @@ Claim PostgresStore::claim(const std::string& id) {
     const auto taken = transaction.exec_params(
         "UPDATE weft.session SET owner = $2, epoch = epoch + 1 "
         "WHERE id = $1 AND (owner = $2 OR NOT weft.holds(owner, $2)) "
-        "RETURNING uid, epoch, progress, checksum",
+        "RETURNING uid, epoch, progress, checksum, principal",
         id, number_);
     if (taken.empty()) {
       const auto rows = transaction.exec_params(
@@ -484,7 +484,7 @@ Claim PostgresStore::claim(const std::string& id) {
     try {
       claim = read_session(transaction, uid, id, {bytes_of(taken[0][2]), number_of(taken[0][3])});
     } catch (const StoreError& error) {
-      claim = DamagedSession{id, uid, error.what()};
+      claim = DamagedSession{id, uid, error.what(), taken[0][4].as<std::string>()};
     }
   });
   if (uid.empty()) return claim;

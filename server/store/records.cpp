@@ -164,6 +164,13 @@ std::string entry_key(const std::string& uid, std::int64_t number) {
   return uid + "/" + std::to_string(number);
 }
 
+std::optional<std::string> owner_of(const std::string& uid, const Row& session) {
+  stored::KeptSession kept;
+  const bool sound =
+      session.checksum == checksum(uid, session.record) && kept.ParseFromString(session.record);
+  return sound ? std::optional(kept.owner()) : std::nullopt;
+}
+
 LeftSession assemble(const std::string& uid, const std::string& id, const Row& session,
                      const Row& progress, const std::vector<NumberedRow>& entries) {
   if (session.checksum != checksum(uid, session.record))

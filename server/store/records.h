@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,9 @@ struct NumberedRow : Row {
 // for what cannot be trusted.
 LeftSession assemble(const std::string& uid, const std::string& id, const Row& session,
                      const Row& progress, const std::vector<NumberedRow>& entries);
+
+// Its principal, where the row can be trusted.
+std::optional<std::string> owner_of(const std::string& uid, const Row& session);
 
 // What the checksum of an entry covers beside the record.
 std::string entry_key(const std::string& uid, std::int64_t number);

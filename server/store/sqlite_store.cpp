@@ -196,11 +196,12 @@ LeftBehind SqliteStore::load() try {
   while (row.executeStep()) {
     const std::string uid = row.getColumn(0).getString();
     const std::string id = row.getColumn(1).getString();
+    records::Row session;
     try {
-      left.sessions.push_back(
-          load_session(uid, id, {blob(row.getColumn(2)), row.getColumn(3).getInt64()}));
+      session = {blob(row.getColumn(2)), row.getColumn(3).getInt64()};
+      left.sessions.push_back(load_session(uid, id, session));
     } catch (const StoreError& error) {
-      left.damaged.push_back({id, uid, error.what()});
+      left.damaged.push_back({id, uid, error.what(), records::owner_of(uid, session)});
     } catch (const SQLite::Exception& error) {
       left.damaged.push_back({id, uid, error.what()});
     }
@@ -393,11 +394,13 @@ Claim SqliteStore::claim(const std::string& id) {
   carry_out([&](SQLite::Database& database) {
     SQLite::Statement row(database, "SELECT record, checksum FROM session WHERE uid = ?");
     row.bind(1, uid);
+    records::Row session;
     try {
       if (!row.executeStep()) throw StoreError("it is gone");
-      claim = load_session(uid, id, {blob(row.getColumn(0)), row.getColumn(1).getInt64()});
+      session = {blob(row.getColumn(0)), row.getColumn(1).getInt64()};
+      claim = load_session(uid, id, session);
     } catch (const StoreError& error) {
-      claim = DamagedSession{id, uid, error.what()};
+      claim = DamagedSession{id, uid, error.what(), records::owner_of(uid, session)};
     }
   });
   std::lock_guard lock(mutex_);

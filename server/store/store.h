@@ -30,6 +30,7 @@ struct LeftSession {
 struct DamagedSession {
   std::string id, uid;
   std::string why;
+  std::optional<std::string> owner = {};  // principal, where that can be trusted
 };
 
 // A creation or deletion that was named, and the uid of its session.

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <fstream>
 #include <set>
+#include <sstream>
 #include <thread>
 
 #include "tests/support/service/service.h"
@@ -219,6 +220,33 @@ TEST_F(AccessTest, SessionsOfAServerThatDidNotAskAreTheAdmins) {
   start();
   EXPECT_EQ(get("a1", "open").second.code, grpc::StatusCode::PERMISSION_DENIED);
   EXPECT_EQ(get("r1", "open").first.name(), "sessions/open");
+}
+
+TEST_F(AccessTest, ADamagedSessionIsShownToItsOwnerWhoMayDeleteIt) {
+  create("a1", "hers");
+  v1::StepSessionRequest step;
+  step.set_name("sessions/hers");
+  step.set_request_id("treacherous");
+  call<v1::StepSessionResponse>("a1", "SessionService/StepSession", step);
+  service_.reset();
+  const std::string file = directory_.path("data/sessions.db");
+  std::ostringstream content;
+  content << std::ifstream(file, std::ios::binary).rdbuf();
+  std::string bytes = content.str();
+  const std::size_t place = bytes.find("treacherous");
+  ASSERT_NE(place, std::string::npos);
+  bytes[place] = 'T';
+  std::ofstream(file, std::ios::binary) << bytes;
+
+  start();
+  EXPECT_EQ(get("b1", "hers").second.code, grpc::StatusCode::PERMISSION_DENIED);
+  EXPECT_EQ(create("b1", "hers").second.code, grpc::StatusCode::PERMISSION_DENIED);
+  EXPECT_EQ(get("a1", "hers").second.code, grpc::StatusCode::DATA_LOSS);
+  EXPECT_EQ(create("a1", "hers").second.code, grpc::StatusCode::ALREADY_EXISTS);
+  v1::DeleteSessionRequest erase;
+  erase.set_name("sessions/hers");
+  EXPECT_EQ(call("a1", "SessionService/DeleteSession", erase).second.code, grpc::StatusCode::OK);
+  EXPECT_EQ(create("a1", "hers").second.code, grpc::StatusCode::OK);
 }
 
 void expect_exhausted(const Error& error, const std::string& subject) {

@@ -434,6 +434,43 @@ TEST_F(Fleet, NamesASessionWhoseDataIsDamaged) {
   EXPECT_EQ(get_error(*b, session).code, grpc::StatusCode::NOT_FOUND);
 }
 
+TEST_F(Fleet, TellsNobodyWhereTheSessionsOfOthersAre) {
+  const TemporaryDirectory directory;
+  std::ofstream(directory.path("tokens"))  // SHA-256 of "a1" and "b1"
+      << "ann f55ff16f66f43360266b95db6f8fec01d76031054306ae4a4b380598f6cfd114\n"
+         "bob 7dc96f776c8423e57a2785489a3f9c43fb6e756876d6ad9a9cac4aa4e72ec193\n";
+  const auto start = [&](const std::string& name) {
+    ServerOptions with_tokens = options(name);
+    with_tokens.tokens = directory.path("tokens");
+    with_tokens.host = "127.0.0.1";
+    auto service = std::make_unique<Service>(with_tokens);
+    service->channel =
+        grpc::CreateChannel(service->server.address(), grpc::InsecureChannelCredentials());
+    return service;
+  };
+  const auto a = start("a"), b = start("b");
+  const auto ask = [](Service& service, const std::string& token, const std::string& method,
+                      const google::protobuf::Message& request) {
+    return raw_call(service, "/weft.v1.SessionService/" + method, request.SerializeAsString(),
+                    false, token);
+  };
+  v1::CreateSessionRequest create;
+  *create.mutable_session()->mutable_scene() = small_scene();
+  create.set_session_id("hers");
+  ASSERT_EQ(ask(*a, "a1", "CreateSession", create).second.code, grpc::StatusCode::OK);
+  EXPECT_EQ(ask(*b, "b1", "CreateSession", create).second.code,
+            grpc::StatusCode::PERMISSION_DENIED);
+  v1::GetSessionRequest get;
+  get.set_name("sessions/hers");
+  EXPECT_EQ(ask(*b, "a1", "GetSession", get).second.reason(), "WRONG_REPLICA");
+  EXPECT_EQ(ask(*b, "b1", "GetSession", get).second.reason(), "SESSION_NOT_YOURS");
+  v1::ListSessionsResponse hers, his;
+  ASSERT_TRUE(hers.ParseFromString(ask(*b, "a1", "ListSessions", v1::ListSessionsRequest()).first));
+  ASSERT_TRUE(his.ParseFromString(ask(*b, "b1", "ListSessions", v1::ListSessionsRequest()).first));
+  EXPECT_THAT(hers.sessions(), SizeIs(1));
+  EXPECT_THAT(his.sessions(), SizeIs(0));
+}
+
 TEST_F(Fleet, SaysWhatIsWrongWithADatabase) {
   const auto refusal = [](const std::string& url) {
     try {

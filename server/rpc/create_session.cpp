@@ -87,7 +87,7 @@ grpc::ServerUnaryReactor* SessionService::create_later(v1::Session* response, Ma
   backend_.planner.ask(
       [this, session, make = std::move(make)] {
         try {
-          const grpc::Status status = make(*session);
+          grpc::Status status = make(*session);
           if (!session->name().empty()) session->set_replica(backend_.replica);
           return status;
         } catch (const StoreError& error) {

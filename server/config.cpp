@@ -48,9 +48,7 @@ std::vector<Number> numbers(Config& config) {
       {"max_snapshots_per_session", &limits.max_snapshots_per_session, 1, 1000,
        "Snapshots on demand of one session"},
       {"idle_s", &config.idle_s, 0, 31'536'000,
-       "Seconds after which a paused session that nobody used is kept in the store alone, until it "
-       "is "
-       "named again; 0: never"},
+       "Seconds unused after which a paused session is kept in the store alone; 0: never"},
       {"max_tests", &limits.max_tests, 1, 256, "Tests of textiles at a time"},
       {"history_bytes", &limits.history_bytes_per_session, kMiB, 1024 * kMiB * 64,
        "Bytes of frames that a session keeps for its streams"},
@@ -80,8 +78,7 @@ std::vector<Text> texts(Config& config, TlsOptions& tls) {
        "Address and port to serve Prometheus' metrics at, or none"},
       {"data_dir", &server.data_dir, "DIR", "Directory that keeps sessions, or none"},
       {"database", &server.database, "URL",
-       "PostgreSQL database that several servers share sessions in, or none; a password is better "
-       "in $WEFT_DATABASE or PGPASSFILE than here"},
+       "PostgreSQL database that keeps them instead, for several servers, or none"},
       {"replica", &server.replica, "NAME",
        "What the others and the load balancer call this server [the host's name]"},
       {"tls_cert", &tls.certificate, "FILE", "Certificate chain (PEM): encrypts, needs --tls-key"},
@@ -254,6 +251,9 @@ Config read_config(int argc, const char* const* argv) {
       "Prints \"weftd listening on ADDRESS:PORT\" when it serves; logs to stderr. SIGTERM or\n"
       "SIGINT ends every stream and call and exits with 0. Sessions are kept, unless told\n"
       "otherwise, in $STATE_DIRECTORY, $XDG_STATE_HOME/weft or ~/.local/state/weft.\n"
+      "\n"
+      "Servers with the same --database share its sessions. The URL, or a connection string of\n"
+      "libpq, can be in $WEFT_DATABASE instead, its password in a PGPASSFILE; neither is logged.\n"
       "\n"
       "Files of TLS are read anew within seconds of a change; while certificate and key do not\n"
       "belong together, no new connection is taken. Tokens are read once, at the start. With\n"

@@ -235,12 +235,25 @@ TEST(Config, KeepsSessionsUnlessToldNotTo) {
   EXPECT_THAT(refusal({"--metrics", "9464"}), HasSubstr("metrics is \"9464\", not an address"));
 }
 
+TEST(Config, SharesADatabaseUnderANameThatALoadBalancerCanSpell) {
+  EXPECT_EQ(config({}).server.database, std::nullopt);
+  EXPECT_EQ(config({"--database", "host=db"}).server.database, "host=db");
+  EXPECT_EQ(config({"--database", "none"}).server.database, std::nullopt);
+  EXPECT_EQ(config({"--replica", "weftd-1"}).server.replica, "weftd-1");
+  EXPECT_THAT(refusal({"--replica", "Cloth 1"}), HasSubstr("replica is \"Cloth 1\", not 1 to 63"));
+  EXPECT_EQ(config({}).server.idle, std::chrono::hours(1));
+  EXPECT_THAT(refusal({"--idle-s", "-1"}), HasSubstr("--idle-s is -1, not within 0 to"));
+}
+
 TEST(Config, HelpsWithEveryFlag) {
   const std::string help = refusal({"--help"});
   for (const char* flag : {"--host",
                            "--port",
                            "--config",
                            "--data-dir",
+                           "--database",
+                           "--replica",
+                           "--idle-s",
                            "--insecure",
                            "--workers",
                            "--max-sessions",

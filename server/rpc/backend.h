@@ -28,7 +28,7 @@ struct StreamCaller {
 };
 
 // Sessions go on for so long while a database that servers share is away.
-inline constexpr std::chrono::seconds kSharedReachTime{2};
+inline constexpr std::chrono::seconds kSharedReachTime{3};
 
 // What the services share. The registry goes first, while sessions can still reach the scheduler.
 // Scenes are planned on a thread of their own, so that a large one holds up no session.

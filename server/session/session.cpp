@@ -383,17 +383,18 @@ void Session::write_reach() {
   {
     std::lock_guard lock(mutex_);
     if (writing_.reach || writing_.then || closed_ || restoring_) return;
-    const std::int64_t wanted = std::min(latest() + ahead_ / 2, goal());
+    const std::int64_t ahead = run_ ? ahead_of(run_->time_scale) : ahead_;
+    const std::int64_t wanted = std::min(latest() + ahead / 2, goal());
     const bool suffices = !active() || (reach_.frame >= wanted && reach_suffices());
     if (suffices && has_readers() == reach_.history_from.has_value()) return;
-    constexpr std::int64_t kLeast = 8, kMost = 16'384;
+    constexpr std::int64_t kLeast = 8;
     const auto now = Clock::now();
     if (!suffices) {
-      if (now - reach_time_ < reach_interval_) ahead_ = std::min(2 * ahead_, kMost);
+      if (now - reach_time_ < reach_interval_) ahead_ = std::min(2 * ahead_, kMostAhead);
       if (now - reach_time_ > 4 * reach_interval_) ahead_ = std::max(ahead_ / 2, kLeast);
       reach_time_ = now;
     }
-    reach = reach_to(std::min(latest() + ahead_, goal()));
+    reach = reach_to(std::min(latest() + ahead, goal()));
     writing_.reach = true;
   }
   log_->write(std::nullopt, reach, [self = shared_from_this(), reach](const std::string&) {
@@ -794,7 +795,7 @@ std::int64_t Session::reach_after(const Event& event) const {
     return latest() + std::min(steps->frames, ahead_);
   }
   if (const auto* run = std::get_if<RunBegun>(&event)) {
-    const std::int64_t ahead = latest() + ahead_;
+    const std::int64_t ahead = latest() + ahead_of(run->time_scale);
     return run->until_frame ? std::min(ahead, std::max(*run->until_frame, goal())) : ahead;
   }
   const bool goes_on = std::holds_alternative<TextileSet>(event) ||
@@ -803,6 +804,13 @@ std::int64_t Session::reach_after(const Event& event) const {
                            ? active()
                            : std::holds_alternative<StepsEnded>(event) && run_.has_value();
   return goes_on ? std::max(latest(), reach_.frame) : latest();
+}
+
+// Frames that the reach is put ahead: at a pace, those of the time for two of its writes.
+std::int64_t Session::ahead_of(std::optional<double> time_scale) const {
+  const double seconds = 2 * reach_interval_.count() * time_scale.value_or(0);
+  const double frames = seconds / scene_.solver.frame_step;
+  return std::max(ahead_, static_cast<std::int64_t>(std::min(frames, 1.0 * kMostAhead)));
 }
 
 // Whether the log knows of all subscribers that frames are held for.

@@ -226,6 +226,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::int64_t goal() const;
   Reach reach_to(std::int64_t frame);
   std::int64_t reach_after(const Event& event) const;
+  std::int64_t ahead_of(std::optional<double> time_scale) const;
   bool reach_suffices();
   bool is_recorded() const;
   bool has_readers() const;
@@ -282,7 +283,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::vector<NamedSnapshot> named_;       // in order of frame
   Writing writing_;
   Reach reach_;                   // as it was written last
-  std::int64_t ahead_ = 16;       // frames that the reach is put ahead
+  static constexpr std::int64_t kMostAhead = 16'384;
+  std::int64_t ahead_ = 16;       // frames that the reach is put ahead, or more
   Clock::time_point reach_time_;  // when it was
   std::optional<Restoring> restoring_;
   std::optional<PastHolders> past_holders_;

@@ -219,6 +219,8 @@ void Connection::await_server(std::chrono::milliseconds longest) {
   channel_->WaitForConnected(std::chrono::system_clock::now() + longest);
 }
 
+bool Connection::is_open() const { return channel_->GetState(false) == GRPC_CHANNEL_READY; }
+
 void Connection::check(const grpc::Status& status) const {
   if (status.ok()) return;
   if (stop_.stop_requested()) throw interrupted();

@@ -2,12 +2,14 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <stop_token>
 #include <string>
 #include <tuple>
 
+#include "client/attempts.h"
 #include "client/problem.h"
 #include "weft/v1/frame.grpc.pb.h"
 #include "weft/v1/lab.grpc.pb.h"
@@ -40,7 +42,8 @@ class Connection {
   std::unique_ptr<Connection> another(std::stop_token stop) const;
   ~Connection();
 
-  // The answer, or a Problem.
+  // The answer, or a Problem. A call that may be repeated is, see Attempts; one that changes
+  // something is named for that.
   template <class Stub, class Request, class Response>
   Response call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                 const Request& request) {
@@ -49,12 +52,22 @@ class Connection {
   // The same, cancelled by another stop; an empty token: by none.
   template <class Stub, class Request, class Response>
   Response call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
-                const Request& request, const std::stop_token& stop) {
-    grpc::ClientContext context;
-    const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
-    Response response;
-    check((std::get<std::unique_ptr<Stub>>(stubs_).get()->*method)(&context, request, &response));
-    return response;
+                Request request, const std::stop_token& stop) {
+    name_call(request);
+    Attempts attempts(*this, request, kPatience, stop);
+    for (;;) {
+      grpc::ClientContext context;
+      attempts.address(context);
+      const std::stop_callback cancel(stop, [&] { context.TryCancel(); });
+      Response response;
+      const grpc::Status status =
+          (std::get<std::unique_ptr<Stub>>(stubs_).get()->*method)(&context, request, &response);
+      if (status.ok()) {
+        attempts.note_message();
+        return response;
+      }
+      attempts.go_on_after(status);
+    }
   }
 
   v1::Session get_session(const std::string& name);  // "sessions/flag"
@@ -71,6 +84,10 @@ class Connection {
 
   // Waits until the server can be reached, at most so long. Between calls nobody works on that.
   void await_server(std::chrono::milliseconds longest);
+  // Whether there is a connection now; whether weftd ever answered.
+  bool is_open() const;
+  bool was_reached() const { return was_reached_; }
+  void note_answer() { was_reached_ = true; }
 
   // Throws what is wrong, if anything.
   void check(const grpc::Status& status) const;
@@ -85,6 +102,7 @@ class Connection {
   std::shared_ptr<const Dialer> dialer_;
   std::string address_;
   std::stop_token stop_;
+  std::atomic<bool> was_reached_ = false;
   std::shared_ptr<grpc::Channel> channel_;
   std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,
              std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>,

@@ -2,26 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <condition_variable>
-#include <mutex>
-
 #include "client/recording/points.h"
 
 namespace weft::client {
-namespace {
-
-constexpr std::chrono::milliseconds kFirstPause{50};
-constexpr std::chrono::milliseconds kLongestPause{250};
-
-void wait(std::chrono::milliseconds time, const std::stop_token& stop) {
-  std::mutex mutex;
-  std::unique_lock lock(mutex);
-  std::condition_variable_any().wait_for(lock, stop, time, [] { return false; });
-}
-
-}  // namespace
-
 FrameFeed::FrameFeed(Connection& connection, v1::StreamFramesRequest request,
                      std::chrono::seconds patience)
     : FrameFeed(connection, std::move(request), patience, connection.stop()) {}
@@ -30,8 +13,8 @@ FrameFeed::FrameFeed(Connection& connection, v1::StreamFramesRequest request,
                      std::chrono::seconds patience, std::stop_token stop)
     : connection_(connection),
       request_(std::move(request)),
-      patience_(patience),
-      stop_(std::move(stop)) {
+      stop_(std::move(stop)),
+      attempts_(connection, request_, patience, stop_) {
   open();
 }
 
@@ -51,7 +34,9 @@ std::optional<v1::StreamFramesResponse> FrameFeed::next() {
     const bool complete = header_ && request_.has_end_frame() && request_.has_start_frame() &&
                           request_.start_frame() > request_.end_frame();
     if (status.ok() || complete || stop_.stop_requested()) return std::nullopt;
-    open_again(status);
+    attempts_.go_on_after(status);
+    ++reconnections_;
+    open();
   }
 }
 
@@ -59,14 +44,14 @@ void FrameFeed::open() {
   cancel_.reset();
   reader_.reset();
   context_ = std::make_unique<grpc::ClientContext>();
+  attempts_.address(*context_);
   cancel_.emplace(stop_, [context = context_.get()] { context->TryCancel(); });
   reader_ = connection_.frames().StreamFrames(context_.get(), request_);
 }
 
 // Notes what is wanted next; false for a message the caller has had.
 bool FrameFeed::note(const v1::StreamFramesResponse& message) {
-  last_heard_ = Clock::now();
-  pause_ = kFirstPause;
+  attempts_.note_message();
   if (message.has_header()) {
     const std::string& numerics = message.header().numerics_id();
     if (header_ && numerics != header_->numerics_id()) {
@@ -98,17 +83,6 @@ bool FrameFeed::note(const v1::StreamFramesResponse& message) {
     request_.set_start_frame(message.frame().number() + 1);
   }
   return true;
-}
-
-void FrameFeed::open_again(const grpc::Status& status) {
-  const bool hopeless =
-      came_from_weftd(status) || !header_ || Clock::now() - last_heard_ > patience_;
-  if (hopeless) connection_.check(status);
-  wait(pause_, stop_);
-  connection_.await_server(kLongestPause);
-  pause_ = std::min(2 * pause_, kLongestPause);
-  ++reconnections_;
-  open();
 }
 
 }  // namespace weft::client

@@ -11,10 +11,11 @@
 namespace weft::client {
 
 // The frames of a session, in order and each once, whatever happens on the road: a stream that
-// breaks is opened again behind the last frame received.
+// breaks is opened again behind the last frame received, and so is one whose server is draining or
+// has lost the session to another.
 class FrameFeed {
  public:
-  // Gives up when nothing was heard for the patience given.
+  // Gives up when nothing is heard for that time after a stream broke.
   FrameFeed(Connection& connection, v1::StreamFramesRequest request, std::chrono::seconds patience);
   // With a stop of its own instead of the connection's.
   FrameFeed(Connection& connection, v1::StreamFramesRequest request, std::chrono::seconds patience,
@@ -30,20 +31,15 @@ class FrameFeed {
   int reconnections() const { return reconnections_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   void open();
   bool note(const v1::StreamFramesResponse& message);
-  void open_again(const grpc::Status& status);
 
   Connection& connection_;
   v1::StreamFramesRequest request_;
-  std::chrono::seconds patience_;
   std::stop_token stop_;
+  Attempts attempts_;
   std::optional<v1::StreamHeader> header_;  // the latest
   int reconnections_ = 0;
-  Clock::time_point last_heard_;
-  std::chrono::milliseconds pause_{};
 
   std::unique_ptr<grpc::ClientContext> context_;
   std::optional<std::stop_callback<std::function<void()>>> cancel_;

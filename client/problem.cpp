@@ -1,11 +1,9 @@
 #include "client/problem.h"
 
 #include <fmt/format.h>
-#include <google/rpc/error_details.pb.h>
 #include <google/rpc/status.pb.h>
 
 #include <array>
-#include <optional>
 
 namespace weft::client {
 namespace {
@@ -69,12 +67,12 @@ Problem damaged(std::string_view path, std::string_view why) {
 
 Problem interrupted() { return {Exit::kInterrupted, "CANCELLED", "INTERRUPTED", "interrupted"}; }
 
-bool came_from_weftd(const grpc::Status& status) {
-  return find_detail<google::rpc::ErrorInfo>(status).has_value();
+std::optional<google::rpc::ErrorInfo> error_info(const grpc::Status& status) {
+  return find_detail<google::rpc::ErrorInfo>(status);
 }
 
 Problem server_problem(const grpc::Status& status) {
-  const auto info = find_detail<google::rpc::ErrorInfo>(status);
+  const auto info = error_info(status);
   if (!info && status.error_code() == grpc::StatusCode::UNAVAILABLE) {
     return {Exit::kNoConnection, "UNAVAILABLE", "NO_CONNECTION", status.error_message()};
   }

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <google/rpc/error_details.pb.h>
 #include <grpcpp/support/status.h>
 
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -50,6 +52,6 @@ Problem interrupted();
 // What a server answered. Answers without google.rpc.ErrorInfo are not from weftd but from the road
 // to it.
 Problem server_problem(const grpc::Status& status);
-bool came_from_weftd(const grpc::Status& status);
+std::optional<google::rpc::ErrorInfo> error_info(const grpc::Status& status);
 
 }  // namespace weft::client

@@ -12,12 +12,24 @@ struct StepOptions {
   std::optional<std::int64_t> expected_frame;
 };
 
+// The answer; a step that is interrupted is ended.
+v1::StepSessionResponse step(Connection& connection, const v1::StepSessionRequest& request) try {
+  return connection.call(&Sessions::StepSession, request);
+} catch (const Problem& problem) {
+  if (problem.exit == Exit::kInterrupted) {
+    v1::PauseSessionRequest pause;
+    pause.set_name(request.name());
+    connection.call(&Sessions::PauseSession, pause, std::stop_token());
+  }
+  throw;
+}
+
 void run_step(Context& context, const StepOptions& options) {
   v1::StepSessionRequest request;
   request.set_name(context.session_or_scene(options.session));
   request.set_frames(options.frames);
   if (options.expected_frame) request.set_expected_frame(*options.expected_frame);
-  const auto response = context.connection().call(&Sessions::StepSession, request);
+  const auto response = step(context.connection(), request);
   context.answer(to_json(response),
                  fmt::format("frame {}, {}{}\n", response.frame(), seconds_text(response.time_s()),
                              response.at_rest() ? ", at rest" : ""));

@@ -1,5 +1,6 @@
 #include "client/load/load.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <queue>
+#include <random>
 #include <tuple>
 #include <vector>
 
@@ -115,6 +117,7 @@ class Load {
     }
 
     void start(v1::FrameService::Stub& stub) {
+      Attempts(load_.connection_, request_).address(context_);
       stub.async()->StreamFrames(&context_, &request_, this);
       StartRead(&message_);
       StartCall();
@@ -246,6 +249,7 @@ class Load {
             const char* name, const Request& request, Then then) {
     auto call = std::make_shared<Call<Request, Response>>();
     call->request = request;
+    Attempts(connection_, request).address(call->context);
     {
       const std::lock_guard lock(mutex_);
       ++calls_;
@@ -283,6 +287,7 @@ class Load {
   void create(LoadedSession& session, Clock::time_point due) {
     v1::CreateSessionRequest request;
     *request.mutable_session()->mutable_scene() = order_.scene;
+    request.set_session_id(fmt::format("load-{:08x}-{}", id_, session.index));
     send<v1::CreateSessionRequest, v1::Session>(
         &Sessions::async_interface::CreateSession, "create", request,
         [this, &session, due](const v1::Session* answer, Clock::time_point time) {
@@ -506,6 +511,7 @@ class Load {
   }
 
   Connection& connection_;
+  const unsigned id_ = std::random_device()();  // of the load, in names of its sessions
   const LoadOrder& order_;
   const std::function<void(const LoadResult&)>& progress_;
   std::vector<std::unique_ptr<Connection>> stream_connections_;

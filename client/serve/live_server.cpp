@@ -5,6 +5,8 @@
 #include <cstring>
 #include <functional>
 #include <map>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include "client/commands/commands.h"
@@ -85,31 +87,58 @@ WebMessage message_of(v1::ViewFramesResponse response) {
 }
 
 // A stream of the server: passes on what the browser says, if anything, and answers with the next
-// message of the server.
+// message of the server. One that only reads is begun anew where it breaks.
 template <class Request, class Response>
 class Stream : public Conversation {
  public:
-  Stream(Connection& connection, auto* stub, auto rpc)
-      : connection_(connection),
-        cancel_(connection.stop(), [this] { context_.TryCancel(); }),
-        stream_((stub->*rpc)(&context_)) {}
-  ~Stream() override { context_.TryCancel(); }
+  using Reader = grpc::ClientReaderWriter<Request, Response>;
+  using Stub = std::function<std::unique_ptr<Reader>(grpc::ClientContext*)>;
+
+  Stream(Connection& connection, Stub stub) : connection_(connection), stub_(std::move(stub)) {}
+  ~Stream() override {
+    if (context_) context_->TryCancel();
+  }
 
   WebMessage answer(const std::string& said) override try {
-    if (!said.empty()) stream_->Write(read_message<Request>(said));
-    Response response;
-    if (stream_->Read(&response)) return message_of(std::move(response));
-    connection_.check(stream_->Finish());
-    return {.last = true};
+    if (!stream_) {
+      first_ = read_message<Request>(said);
+      attempts_.emplace(connection_, first_);
+      open();
+    } else if (!said.empty()) {
+      stream_->Write(read_message<Request>(said));
+    }
+    for (Response response;;) {
+      if (stream_->Read(&response)) {
+        attempts_->note_message();
+        return message_of(std::move(response));
+      }
+      const grpc::Status status = stream_->Finish();
+      if (status.ok()) return {.last = true};
+      attempts_->go_on_after(status);
+      open();
+    }
   } catch (const Problem& problem) {
     return {.bytes = to_json(problem).dump(), .last = true};
   }
 
  private:
+  void open() {
+    cancel_.reset();
+    stream_.reset();
+    context_ = std::make_unique<grpc::ClientContext>();
+    attempts_->address(*context_);
+    cancel_.emplace(connection_.stop(), [context = context_.get()] { context->TryCancel(); });
+    stream_ = stub_(context_.get());
+    stream_->Write(first_);
+  }
+
   Connection& connection_;
-  grpc::ClientContext context_;
-  std::stop_callback<std::function<void()>> cancel_;
-  std::unique_ptr<grpc::ClientReaderWriter<Request, Response>> stream_;
+  const Stub stub_;
+  Request first_;  // says which session it is of
+  std::optional<Attempts> attempts_;
+  std::unique_ptr<grpc::ClientContext> context_;
+  std::optional<std::stop_callback<std::function<void()>>> cancel_;
+  std::unique_ptr<Reader> stream_;
 };
 
 // ---- answers
@@ -159,11 +188,11 @@ HttpResponse LiveServer::answer(const HttpRequest& request) try {
 std::unique_ptr<Conversation> LiveServer::converse(const std::string& path) {
   if (path == "/weft.v1.FrameService/ViewFrames") {
     return std::make_unique<Stream<v1::ViewFramesRequest, v1::ViewFramesResponse>>(
-        connection_, &connection_.frames(), &v1::FrameService::Stub::ViewFrames);
+        connection_, [this](auto* context) { return connection_.frames().ViewFrames(context); });
   }
   if (path == "/weft.v1.SessionService/Interact") {
     return std::make_unique<Stream<v1::InteractRequest, v1::InteractResponse>>(
-        connection_, &connection_.sessions(), &Sessions::Interact);
+        connection_, [this](auto* context) { return connection_.sessions().Interact(context); });
   }
   return nullptr;
 }

@@ -373,5 +373,22 @@ TEST(DefaultServer, IsWhereWeftdListens) {
   EXPECT_EQ(*server.host + ':' + std::to_string(server.port), client::kDefaultServer);
 }
 
+TEST_F(CommandsTest, AStepThatIsInterruptedEnds) {
+  constexpr std::int64_t kFrames = 100'000;
+  const v1::Session session = service_.create(small_scene(), "cloth");
+  std::stop_source stop;
+  Outcome outcome;
+  std::thread stepping([&] {
+    outcome = weft({"step", "cloth", "--frames", std::to_string(kFrames)}, stop.get_token());
+  });
+  while (service_.get(session).frame() == 0) std::this_thread::yield();
+  stop.request_stop();
+  stepping.join();
+  EXPECT_EQ(outcome.exit, 130);
+  const std::int64_t frame = service_.get(session).frame();
+  EXPECT_LT(frame, kFrames);
+  EXPECT_EQ(service_.get(session).frame(), frame);
+}
+
 }  // namespace
 }  // namespace weft::testing

@@ -198,9 +198,11 @@ TEST_F(RecordingTest, GivesUpOnAServerThatIsGoneAndKeepsWhatItHas) {
   EXPECT_EQ(recorded(file_).size(), 21);
 }
 
-TEST_F(RecordingTest, EndsWhenTheServerLeavesInOrder) {
+TEST_F(RecordingTest, EndsWhereTheServerLeftInOrderAndNoOtherCame) {
   Outcome outcome;
-  std::thread recording([&] { outcome = weft({"record", "cloth", "-o", file_, "--json"}); });
+  std::thread recording([&] {
+    outcome = weft({"record", "cloth", "--patience", "1", "-o", file_, "--json"});
+  });
   await_frame(file_, 0);
   service_.server.stop();
   recording.join();

@@ -10,6 +10,7 @@
 #include "client/recording/reader.h"
 #include "client/serve/live_server.h"
 #include "tests/client/client_test.h"
+#include "tests/client/fake_fleet.h"
 #include "tests/support/service/process.h"
 
 namespace weft::testing {
@@ -22,6 +23,7 @@ namespace websocket = beast::websocket;
 using asio::ip::tcp;
 using Json = nlohmann::json;
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -62,10 +64,11 @@ class WebSocket {
 // The page's server before a server with one session of 4 x 5 particles.
 class ServeTest : public ClientTest {
  protected:
-  tcp::socket connect() {
+  tcp::socket connect() { return connect(served_); }
+  tcp::socket connect(const client::LiveServer& served) {
     tcp::socket socket(context_);
-    const std::size_t colon = served_.address().rfind(':');
-    const auto port = static_cast<std::uint16_t>(std::stoi(served_.address().substr(colon + 1)));
+    const std::size_t colon = served.address().rfind(':');
+    const auto port = static_cast<std::uint16_t>(std::stoi(served.address().substr(colon + 1)));
     socket.connect({asio::ip::make_address("127.0.0.1"), port});
     return socket;
   }
@@ -159,10 +162,7 @@ TEST_F(ServeTest, AnErrorIsTheServersOwn) {
 TEST_F(ServeTest, AServerThatIsGoneIsSaidToBe) {
   const auto nowhere = client::Connection::to("127.0.0.1:1", {});
   const client::LiveServer served(*nowhere, {});
-  const std::size_t colon = served.address().rfind(':');
-  tcp::socket socket(context_);
-  socket.connect({asio::ip::make_address("127.0.0.1"),
-                  static_cast<std::uint16_t>(std::stoi(served.address().substr(colon + 1)))});
+  tcp::socket socket = connect(served);
   Request request(http::verb::post, std::string(kSessions) + "ListSessions", 11, "{}");
   request.set(http::field::host, served.address());
   request.prepare_payload();
@@ -189,6 +189,27 @@ TEST_F(ServeTest, OnlyItsOwnPagesMayAsk) {
     EXPECT_FALSE(stream(kView, origin).is_open()) << origin;
   }
   EXPECT_TRUE(stream(kView, "http://" + served_.address()).is_open());
+}
+
+TEST_F(ServeTest, AViewGoesOnAtAnotherServer) {
+  const FakeFleet fleet({stream_removed(), wrong_replica("weftd-2")});
+  const auto connection = client::Connection::to(fleet.address(), {});
+  client::LiveServer served(*connection, {});
+  WebSocket view(connect(served), served.address(), kView);
+  std::vector<std::int64_t> frames;
+  std::string said = R"({"session": "sessions/cloth", "uid": "uid-1", "credits": 1})";
+  for (int answer = 0; answer < 6; ++answer) {
+    const std::string message = view.ask(said);
+    ASSERT_TRUE(view.is_open()) << message;
+    const bool is_header = message.starts_with('{');
+    if (!is_header) frames.push_back(facts_of(message)["frame"]["number"]);
+    said = is_header ? "" : R"({"credits": 1})";
+  }
+  EXPECT_THAT(frames, ElementsAre(0, 1, 2));
+  EXPECT_THAT(fleet.attempts(),
+              ElementsAre(Attempt{.session = "cloth", .uid = "uid-1"},
+                          Attempt{.session = "cloth", .uid = "uid-1"},
+                          Attempt{.session = "cloth", .replica = "weftd-2", .uid = "uid-1"}));
 }
 
 TEST_F(ServeTest, RequestsAndMessagesAreBounded) {

@@ -1,78 +1,17 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <condition_variable>
-#include <mutex>
-#include <thread>
 #include <vector>
 
 #include "client/output/text.h"
-#include "client/problem.h"
 #include "client/templates/templates.h"
+#include "tests/stress/caller.h"
 #include "tests/stress/recorded.h"
 #include "tests/stress/stress.h"
 #include "tests/stress/weftd.h"
 
 namespace weft::stress {
 namespace {
-
-using Sessions = v1::SessionService::Stub;
-
-// Changes textiles, each call until it is acknowledged.
-class Caller {
- public:
-  Caller(const Weftd& weftd, std::vector<Recorded>& all)
-      : connection_(weftd.connect()), thread_([this, &all](const std::stop_token& stop) {
-          for (int number = 0; !stop.stop_requested(); ++number)
-            change(all[static_cast<std::size_t>(number) % all.size()], number, stop);
-        }) {}
-
-  // Calls that were refused as they should be, with anything else, and acknowledged.
-  struct Counts {
-    int refused = 0, wrong = 0, acknowledged = 0;
-  };
-  Counts counts() const {
-    const std::lock_guard lock(mutex_);
-    return counts_;
-  }
-
-  // Waits until so many more are counted.
-  void await(int Counts::*count, int more) {
-    std::unique_lock lock(mutex_);
-    const int enough = counts_.*count + more;
-    if (!changed_.wait_for(lock, std::chrono::minutes(2), [&] { return counts_.*count >= enough; }))
-      throw std::runtime_error("calls stay away for two minutes");
-  }
-
- private:
-  static constexpr std::chrono::milliseconds kPace{20}, kRetry{5};
-
-  void change(Recorded& one, int number, const std::stop_token& stop) {
-    Change change{change_of(one.session, number)};
-    while (!stop.stop_requested()) try {
-        change.applied_frame =
-            connection_->call(&Sessions::UpdateTextile, change.request).applied_frame();
-        one.changes.push_back(change);
-        note(&Counts::acknowledged);
-        return std::this_thread::sleep_for(kPace);
-      } catch (const client::Problem& problem) {
-        note(problem.reason == "STORE_UNWRITABLE" ? &Counts::refused : &Counts::wrong);
-        std::this_thread::sleep_for(kRetry);
-      }
-  }
-
-  void note(int Counts::*count) {
-    const std::lock_guard lock(mutex_);
-    ++(counts_.*count);
-    changed_.notify_all();
-  }
-
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  Counts counts_;
-  const std::unique_ptr<client::Connection> connection_;
-  std::jthread thread_;
-};
 
 struct Seen {
   Caller::Counts counts;
@@ -89,11 +28,11 @@ Seen endure(Disk disk, int rounds, int Caller::Counts::*expected, int enough) {
   Weftd weftd;
   const auto connection = weftd.connect();
   Hearing hearing(4);
-  std::vector<Recorded> all = record_sessions(weftd, *connection, scene, hearing);
+  std::vector<Recorded> all = record_sessions(weftd.path(""), *connection, scene, hearing);
 
   Seen seen;
   {
-    Caller caller(weftd, all);
+    Caller caller(weftd.connect(), all);
     for (int round = 0; round < rounds; ++round) {
       caller.await(&Caller::Counts::acknowledged, 10);
       weftd.set_disk(disk);
@@ -108,11 +47,7 @@ Seen endure(Disk disk, int rounds, int Caller::Counts::*expected, int enough) {
   hearing.wait_for_all_after(Clock::now());
 
   for (Recorded& one : all) {
-    v1::PauseSessionRequest pause;
-    pause.set_name(one.session.name());
-    connection->call(&Sessions::PauseSession, pause);
-    one.recorder.get();
-    compare(scene, one, connection->get_session(one.session.name()).frame(), seen.faults);
+    finish(*connection, scene, one, seen.faults);
     seen.changes += one.changes.size();
   }
   seen.recordings = all.size();

@@ -32,7 +32,19 @@ constexpr std::array kTests{
     Test{"slow-disk", weft::stress::slow_disk},
     Test{"drain", weft::stress::drain},
     Test{"sizing", weft::stress::sizing},
+    Test{"scale-out-kill", weft::stress::fleet_kills},
+    Test{"scale-out-freeze", weft::stress::fleet_freezes},
+    Test{"scale-out-resize", weft::stress::fleet_resize},
+    Test{"scale-out-drain", weft::stress::fleet_drain},
+    Test{"scale-out-database", weft::stress::fleet_database},
+    Test{"scale-out-full", weft::stress::fleet_full},
+    Test{"scale-out-reload", weft::stress::fleet_reload},
 };
+
+// "scale-out" names all whose names begin with "scale-out-".
+bool is_meant(const Test& test, const std::string& name) {
+  return test.name == name || std::string(test.name).starts_with(name + '-');
+}
 
 int usage() {
   std::string names;
@@ -65,12 +77,14 @@ int main(int argc, char** argv) {
     names.erase(names.begin());
   }
   for (const std::string& name : names) {
-    if (std::none_of(kTests.begin(), kTests.end(), [&](const Test& t) { return t.name == name; }))
+    if (std::none_of(kTests.begin(), kTests.end(),
+                     [&](const Test& t) { return is_meant(t, name); }))
       return usage();
   }
   bool good = true;
   for (const Test& test : kTests) {
-    if (names.empty() || std::find(names.begin(), names.end(), test.name) != names.end())
+    if (names.empty() || std::any_of(names.begin(), names.end(),
+                                     [&](const auto& name) { return is_meant(test, name); }))
       good = run(test, form) && good;
   }
   return good ? 0 : 1;

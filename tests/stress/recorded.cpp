@@ -10,15 +10,16 @@
 
 namespace weft::stress {
 
-std::vector<Recorded> record_sessions(const Weftd& weftd, client::Connection& connection,
-                                      const v1::Scene& scene, Hearing& hearing) {
-  using Sessions = v1::SessionService::Stub;
+using Sessions = v1::SessionService::Stub;
+
+std::vector<Recorded> record_sessions(const std::string& directory, client::Connection& connection,
+                                      const v1::Scene& scene, Hearing& hearing, double pace) {
   std::vector<Recorded> all(hearing.recorders());
   for (std::size_t i = 0; i < all.size(); ++i) {
     v1::CreateSessionRequest create;
     *create.mutable_session()->mutable_scene() = scene;
     all[i].session = connection.call(&Sessions::CreateSession, create);
-    all[i].path = weftd.path(fmt::format("{}.weft", i));
+    all[i].path = fmt::format("{}/{}.weft", directory, i);
     client::RecordingOrder order;
     order.session = all[i].session.name();
     order.path = all[i].path;
@@ -34,7 +35,7 @@ std::vector<Recorded> record_sessions(const Weftd& weftd, client::Connection& co
   for (const Recorded& one : all) {
     v1::RunSessionRequest run;
     run.set_name(one.session.name());
-    run.set_time_scale(1);
+    run.set_time_scale(pace);
     connection.call(&Sessions::RunSession, run);
   }
   return all;
@@ -49,19 +50,33 @@ v1::UpdateTextileRequest change_of(const v1::Session& session, int number) {
   return request;
 }
 
-void compare(const v1::Scene& scene, const Recorded& one, std::int64_t last, Faults& faults) {
-  client::RecordingReader reader(one.path);
-  faults.lost += last - reader.last_frame() + reader.first_frame();
+void finish(client::Connection& connection, const v1::Scene& scene, Recorded& one, Faults& faults) {
+  v1::PauseSessionRequest pause;
+  pause.set_name(one.session.name());
+  connection.call(&Sessions::PauseSession, pause);
+  one.recorder.get();
+  const std::int64_t last = connection.get_session(one.session.name()).frame();
+  {
+    const client::RecordingReader reader(one.path);
+    faults.lost += last - reader.last_frame() + reader.first_frame();
+  }
+  compare(one.path, scene, one.changes, faults);
+}
+
+void compare(const std::string& path, const v1::Scene& scene, const std::vector<Change>& changes,
+             Faults& faults) {
+  client::RecordingReader reader(path);
   Simulation simulation = simulation_of(scene);
   std::size_t done = 0;
   for (std::int64_t number = 0; number <= reader.last_frame(); ++number) {
-    for (; done < one.changes.size() && one.changes[done].applied_frame <= number; ++done) {
-      const v1::UpdateTextileRequest& request = one.changes[done].request;
+    for (; done < changes.size() && changes[done].applied_frame <= number; ++done) {
+      const v1::UpdateTextileRequest& request = changes[done].request;
       const Textile& current = simulation.scene().sheets[0].textile;
       const auto textile = merge_textile(current, request.textile(), request.update_mask());
       simulation.set_textile(0, std::get<Textile>(textile));
     }
     if (number > 0 && !simulation.advance_frame()) throw std::runtime_error(simulation.failure());
+    if (number < reader.first_frame()) continue;
     ++faults.frames;
     if (reader.read(number).positions_m() != double_planes(simulation)) ++faults.differing;
   }

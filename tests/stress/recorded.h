@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <future>
 #include <mutex>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "client/connection.h"
 #include "client/recording/recorder.h"
-#include "tests/stress/weftd.h"
 
 // Sessions that are recorded while their textiles are changed, and what is wrong with the
 // recordings.
@@ -31,11 +33,12 @@ class Hearing {
     changed_.notify_all();
   }
 
-  // The times at which all of them had heard something after `moment`.
-  std::vector<Clock::time_point> wait_for_all_after(Clock::time_point moment) {
+  // The times at which all of them, or those from `first` on, had heard something after `moment`.
+  std::vector<Clock::time_point> wait_for_all_after(Clock::time_point moment,
+                                                    std::size_t first = 0) {
     std::unique_lock lock(mutex_);
     std::vector<Clock::time_point> times;
-    for (const Heard& heard : heard_) {
+    for (const Heard& heard : std::span(heard_).subspan(first)) {
       if (!changed_.wait_for(lock, std::chrono::minutes(2), [&] { return heard.time > moment; }))
         throw std::runtime_error("a recorder does not go on within two minutes");
       times.push_back(heard.time);
@@ -67,10 +70,10 @@ struct Recorded {
   std::future<client::RecordingResult> recorder;
 };
 
-// Sessions of the scene at real time, each with a recorder that goes on as after any broken
-// connection.
-std::vector<Recorded> record_sessions(const Weftd& weftd, client::Connection& connection,
-                                      const v1::Scene& scene, Hearing& hearing);
+// Sessions of the scene that run at the pace, each with a recorder that goes on as after any broken
+// connection; recordings are files of the directory. The connection is the recorders'.
+std::vector<Recorded> record_sessions(const std::string& directory, client::Connection& connection,
+                                      const v1::Scene& scene, Hearing& hearing, double pace = 1);
 
 // The `number`th change, the same whenever it is sent again.
 v1::UpdateTextileRequest change_of(const v1::Session& session, int number);
@@ -81,7 +84,11 @@ struct Faults {
   std::int64_t differing = 0;
 };
 
-// Holds a recording to what the core computes with the acknowledged changes.
-void compare(const v1::Scene& scene, const Recorded& one, std::int64_t last, Faults& faults);
+// Pauses a session, waits for its recording, and holds it to what the core computes with the
+// acknowledged changes.
+void finish(client::Connection& connection, const v1::Scene& scene, Recorded& one, Faults& faults);
+// The same of the frames that a file has, which may begin late.
+void compare(const std::string& path, const v1::Scene& scene, const std::vector<Change>& changes,
+             Faults& faults);
 
 }  // namespace weft::stress

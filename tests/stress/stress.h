@@ -2,8 +2,8 @@
 
 #include <string>
 
-// What a weftd of its own process holds under load and faults. Each test is one function here and
-// one line of the table that `./dev stress` prints.
+// What a weftd of its own process, or a fleet of them, holds under load and faults. Each test is
+// one function here and one line of the table that `./dev stress` prints.
 namespace weft::stress {
 
 enum class Form { kShort, kLong };
@@ -27,5 +27,12 @@ Outcome read_only_disk(Form form);
 Outcome slow_disk(Form form);
 Outcome drain(Form form);
 Outcome sizing(Form form);
+Outcome fleet_kills(Form form);
+Outcome fleet_freezes(Form form);
+Outcome fleet_resize(Form form);
+Outcome fleet_drain(Form form);
+Outcome fleet_database(Form form);
+Outcome fleet_full(Form form);
+Outcome fleet_reload(Form form);
 
 }  // namespace weft::stress

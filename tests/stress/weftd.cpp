@@ -82,11 +82,14 @@ Usage Weftd::usage() const {
           .files = static_cast<int>(std::distance(begin(files), end(files)))};
 }
 
-void Weftd::kill_and_start() {
+void Weftd::kill() {
   process_->signal(SIGKILL);
   process_->wait();
-  start();
 }
+
+void Weftd::freeze() const { process_->signal(SIGSTOP); }
+
+void Weftd::thaw() const { process_->signal(SIGCONT); }
 
 void Weftd::set_disk(Disk disk) const {
   std::ofstream(path("disk"), std::ios::in) << static_cast<char>(disk);

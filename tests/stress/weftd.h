@@ -36,15 +36,21 @@ class Weftd {
   std::string path(const std::string& name) const { return directory_.path(name); }
   Usage usage() const;
 
-  void kill_and_start();
+  void kill();
+  void start();
+  void kill_and_start() {
+    kill();
+    start();
+  }
+  // It stands still: SIGSTOP.
+  void freeze() const;
+  void thaw() const;
   // How its disk behaves from now on.
   void set_disk(Disk disk) const;
   // Its exit code.
   int terminate();
 
  private:
-  void start();
-
   testing::TemporaryDirectory directory_;
   std::vector<std::string> flags_;
   std::string host_;

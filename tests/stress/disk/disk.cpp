@@ -4,6 +4,7 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -34,6 +35,13 @@ Disk disk() {
 int write_error() { return disk() == Disk::kFull ? ENOSPC : disk() == Disk::kReadOnly ? EROFS : 0; }
 int change_error() { return disk() == Disk::kReadOnly ? EROFS : 0; }
 
+int error_at(int file, size_t size, off64_t at) {
+  struct stat64 now;
+  const bool grows = disk() == Disk::kCrowded && fstat64(file, &now) == 0 &&
+                     at + static_cast<off64_t>(size) > now.st_size;
+  return grows ? ENOSPC : write_error();
+}
+
 // What the library behind this one does, unless there is an error.
 template <class Call, class... Arguments>
 auto go_on(const char* name, int error, Call /*own*/, Arguments... arguments) {
@@ -58,7 +66,10 @@ ssize_t write(int file, const void* data, size_t size) {
   return go_on("write", file < kFirstFile ? 0 : write_error(), write, file, data, size);
 }
 ssize_t pwrite64(int file, const void* data, size_t size, off64_t at) {
-  return go_on("pwrite64", write_error(), pwrite64, file, data, size, at);
+  return go_on("pwrite64", error_at(file, size, at), pwrite64, file, data, size, at);
+}
+ssize_t pwrite(int file, const void* data, size_t size, off_t at) {
+  return go_on("pwrite", error_at(file, size, at), pwrite, file, data, size, at);
 }
 int ftruncate64(int file, off64_t size) noexcept {
   return go_on("ftruncate64", change_error(), ftruncate64, file, size);

@@ -4,11 +4,12 @@
 
 namespace weft::stress {
 
-// How the disk of a weftd behaves that runs with libweft-bad-disk: the first byte of the file that
-// WEFT_BAD_DISK names.
+// How the disk of a program behaves that runs with libweft-bad-disk: the first byte of the file
+// that WEFT_BAD_DISK names.
 enum class Disk : char {
   kGood = 'g',
   kFull = 'f',      // nothing more can be written
+  kCrowded = 'c',   // no file can grow
   kReadOnly = 'r',  // nor opened for writing, renamed or removed
   kSlow = 's',      // what was written takes kSync to reach it
 };

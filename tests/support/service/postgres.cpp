@@ -64,7 +64,8 @@ std::vector<pid_t> family_of(pid_t parent) {
 
 bool Postgres::is_installed() { return !programs().empty(); }
 
-Postgres::Postgres(std::vector<std::string> settings) : settings_(std::move(settings)) {
+Postgres::Postgres(std::vector<std::string> settings, std::vector<std::string> environment)
+    : settings_(std::move(settings)), environment_(std::move(environment)) {
   if (!is_installed()) throw std::runtime_error("no PostgreSQL in /usr/lib/postgresql");
   if (const passwd* nobody = getpwnam("nobody"); geteuid() == 0 && nobody != nullptr) {
     if (chown(directory_.name().c_str(), nobody->pw_uid, nobody->pw_gid) != 0)
@@ -110,7 +111,7 @@ void Postgres::start() {
   settings_.pop_back();
   const auto words = as_nobody(programs() / "postgres", arguments);
   process_.emplace(words.front(), std::vector(words.begin() + 1, words.end()),
-                   directory_.path("postgres.txt"));
+                   directory_.path("postgres.txt"), 0, environment_);
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
   while (PQping(url().c_str()) != PQPING_OK) {
     if (std::chrono::steady_clock::now() > end)

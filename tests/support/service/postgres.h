@@ -15,8 +15,10 @@ class Postgres {
   // Whether this machine has one.
   static bool is_installed();
 
-  // Serves once constructed. Settings are "name=value". Throws std::runtime_error where it cannot.
-  explicit Postgres(std::vector<std::string> settings = {"fsync=off"});
+  // Serves once constructed. Settings are "name=value", as is what is added to its environment.
+  // Throws std::runtime_error where it cannot.
+  explicit Postgres(std::vector<std::string> settings = {"fsync=off"},
+                    std::vector<std::string> environment = {});
   ~Postgres();
   Postgres(const Postgres&) = delete;
   Postgres& operator=(const Postgres&) = delete;
@@ -37,7 +39,7 @@ class Postgres {
 
  private:
   TemporaryDirectory directory_;
-  std::vector<std::string> settings_;
+  std::vector<std::string> settings_, environment_;
   std::optional<Process> process_;
 };
 

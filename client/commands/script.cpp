@@ -132,6 +132,8 @@ record   file; velocities, encoding; to the end of the case
 run      until_frame, until_time_s, until_rest; time_scale; wait: false goes on at once
 wait     frame
 pause    stops what runs
+snapshot snapshot: a name; keeps the session as it is now
+restore  snapshot; session: a new one that goes on from there, as often as wanted
 expect   frame, time_s, at_rest, rest_time_s, largest_strain (of all frames), strain,
          kinetic_energy_j, potential_energy_j, energy_j (of the newest),
          particle: {sheet, row, column, x_m, y_m, z_m};

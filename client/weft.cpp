@@ -13,7 +13,8 @@ namespace {
 
 constexpr const char* kDescription = "weft: simulates textiles on a server";
 
-constexpr const char* kFooter = R"(A first run:
+constexpr const char* kFooter = R"(
+A first run:
   weft scene new --template sphere -o scene.json
   weft session create scene.json --id drape
   weft serve drape
@@ -22,16 +23,9 @@ constexpr const char* kFooter = R"(A first run:
   weft render drape.weft -o drape.png
   weft export drape.weft --format obj -o drape
 
-With --embedded no server is needed: it lives within the command, and SESSION is a scene file.
-With --json every answer is one JSON document (watch: one a line), on stderr {"error": ...}.
-
-Exit codes:
-  0    done
-  1    refused by the server, not to be had, or not as expected
-  2    wrong command line
-  3    no connection to the server
-  4    a file cannot be read or written, or is damaged
-  130  interrupted before its end)";
+With --embedded no server is needed: it lives within the command, and SESSION is
+a scene file. With --json every answer is one JSON document (watch: one a line),
+on stderr {"error": ...}. Exit codes: weft help errors.)";
 
 std::string problem_text(const Problem& problem) {
   const auto& violations = problem.violations;
@@ -130,12 +124,11 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
                  arguments.end();  // for usage errors too
   CLI::App app(kDescription, "weft");
   app.fallthrough();
-  app.get_formatter()->column_width(36);
-  app.footer(
-      "--server, --token-file, --tls-ca, --embedded and --json go with every command: weft --help");
+  app.formatter(help_formatter());
+  app.footer("--server, --token-file, --tls-ca, --embedded and --json: see weft --help");
   add_options(app, context);
   add_commands(app, context);
-  app.footer(kFooter);  // the commands keep the line above
+  app.footer(topics_text() + kFooter);  // the commands keep the line above
 
   try {
     if (arguments.size() > 1 && arguments[0] == "completion" && arguments[1] == "words") {

@@ -13,16 +13,24 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::Each;
 using ::testing::HasSubstr;
+using ::testing::Le;
 using ::testing::SizeIs;
 
 using CommandsTest = ClientTest;
 
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
 // Lines that are one JSON object each, by protobuf's own parser.
 std::vector<google::protobuf::Struct> json_lines(const std::string& text) {
   std::vector<google::protobuf::Struct> objects;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
+  for (const std::string& line : lines_of(text)) {
     const auto status = google::protobuf::util::JsonStringToMessage(line, &objects.emplace_back());
     EXPECT_TRUE(status.ok()) << status.ToString() << " in " << line;
   }
@@ -159,13 +167,43 @@ TEST_F(CommandsTest, TopShowsTheServerAndItsSessions) {
 TEST_F(CommandsTest, HelpIsAnAnswer) {
   const Outcome help = weft({"--help"});
   EXPECT_EQ(help.exit, 0);
-  EXPECT_THAT(help.out, AllOf(HasSubstr("Exit codes"), HasSubstr("record"), HasSubstr("export")));
+  EXPECT_THAT(help.out, AllOf(HasSubstr("\n  units "), HasSubstr("record"), HasSubstr("export")));
   EXPECT_THAT(weft({"record", "--help"}).out, HasSubstr("--until-rest"));
   EXPECT_EQ(weft({"help"}).out, help.out);
   EXPECT_EQ(weft({"help", "scene", "new"}).out, weft({"scene", "new", "--help"}).out);
   const Outcome unknown = weft({"help", "knit"});
   EXPECT_EQ(unknown.exit, 2);
-  EXPECT_THAT(unknown.err, HasSubstr("there is no command \"knit\""));
+  EXPECT_THAT(unknown.err, HasSubstr("there is no command or topic \"knit\""));
+}
+
+TEST_F(CommandsTest, HelpOfEveryCommandAndTopicFits80Columns) {
+  const auto words = [](std::vector<std::string> before) {
+    before.insert(before.begin(), {"completion", "words", "help"});
+    before.emplace_back();
+    return lines_of(run_weft(before).out);
+  };
+  std::vector<std::vector<std::string>> all{{}};
+  for (const std::string& word : words({})) {
+    all.push_back({word});
+    if (word == "help") continue;
+    for (const std::string& below : words({word})) all.push_back({word, below});
+  }
+  EXPECT_GT(all.size(), 60);
+  for (std::vector<std::string>& each : all) {
+    each.insert(each.begin(), "help");
+    const Outcome help = weft(each);
+    EXPECT_EQ(help.exit, 0) << help.err;
+    EXPECT_THAT(lines_of(help.out), Each(SizeIs(Le(80)))) << help.out;
+  }
+}
+
+TEST_F(CommandsTest, TheTopicOnErrorsNamesWhatTheyHave) {
+  const Outcome error = weft({"session", "get", "nobody", "--json"});
+  const auto told = weft({"help", "errors"}).out;
+  EXPECT_THAT(told, HasSubstr("\n  " + std::to_string(error.exit) + "    refused by the server"));
+  const auto fields = nlohmann::json::parse(error.err)["error"];
+  for (const auto& [name, value] : fields.items()) EXPECT_THAT(told, HasSubstr('"' + name + '"'));
+  EXPECT_THAT(told, HasSubstr(fields["reason"].get<std::string>()));
 }
 
 TEST_F(CommandsTest, AWrongCommandLineIsToldWhatThereIs) {
@@ -199,6 +237,8 @@ TEST_F(CommandsTest, AShellCompletesCommandsOptionsValuesAndSessions) {
   EXPECT_EQ(completed({"export", "a.weft", "--format", "p"}), "pc2\n");
   EXPECT_EQ(completed({"run", ""}), "drape\n");
   EXPECT_EQ(completed({"export", ""}), "") << "the shell names files";
+  EXPECT_EQ(completed({"help", "sc"}), "scene\nscenes\nscript\nscripting\n");
+  EXPECT_EQ(completed({"help", "scene", "n"}), "new\n");
   unsetenv("WEFT_SERVER");  // NOLINT(concurrency-mt-unsafe)
 }
 

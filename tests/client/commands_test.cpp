@@ -223,6 +223,29 @@ TEST_F(CommandsTest, AWrongCommandLineIsToldWhatThereIs) {
               HasSubstr("\"fbx\" is none of csv, gltf, mdd, obj, pc2, usda, vtk"));
 }
 
+TEST_F(CommandsTest, ARefusalNamesWhatTheUserGave) {
+  service_.create(small_scene(), "drape");
+  ask({"step", "drape", "--frames", "10"});
+  const auto told = [&](const std::vector<std::string>& arguments) {
+    const Outcome outcome = weft(arguments);
+    EXPECT_EQ(outcome.exit, 1);
+    return outcome.err;
+  };
+  EXPECT_EQ(told({"watch", "drape", "--to", "3"}),
+            "weft: --to: 3 lies before the first frame, 10\n");
+  EXPECT_THAT(told({"record", "drape", "--from", "-1", "-o", path("a")}), HasSubstr(" --from: -1"));
+  EXPECT_THAT(told({"run", "drape", "--until-frame", "3"}), HasSubstr(" --until-frame: "));
+  EXPECT_THAT(told({"session", "snapshot", "drape", "--id", "A"}), HasSubstr(" --id: \"A\""));
+  EXPECT_THAT(told({"session", "get", "no name"}), HasSubstr(" SESSION: \"sessions/no name\""));
+  EXPECT_THAT(told({"act", "grab", "drape", "1,1", "--to", "1e9,0,0"}), HasSubstr(" --to: 1e+09"));
+  EXPECT_THAT(told({"act", "grab", "drape", "1,1", "--to", "0,0,0", "--over", "1e9"}),
+              HasSubstr(" --over: 1e+09"));
+  const auto error =
+      nlohmann::json::parse(told({"watch", "drape", "--to", "3", "--json"}))["error"];
+  EXPECT_EQ(error["violations"][0]["field"], "--to");
+  EXPECT_EQ(error["message"], "--to: 3 lies before the first frame, 10");
+}
+
 TEST_F(CommandsTest, AShellCompletesCommandsOptionsValuesAndSessions) {
   service_.create(small_scene(), "drape");
   setenv("WEFT_SERVER", address_.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
@@ -331,7 +354,7 @@ TEST_F(CommandsTest, ATextileChangesOverTheTimeGiven) {
   const auto half = ask({"session", "get", "cloth"});
   EXPECT_DOUBLE_EQ(half["scene"]["sheets"][0]["textile"]["raw"]["stretch_n_per_m"], 300);
   const Outcome long_ = weft({"textile", "set", "cloth", "--set", "bend_n_m2=0", "--over", "1e5"});
-  EXPECT_THAT(long_.err, HasSubstr("duration_s: 1e+05 s is not within 0 to 10000 s"));
+  EXPECT_THAT(long_.err, HasSubstr("--over: 1e+05 s is not within 0 to 10000 s"));
 }
 
 TEST_F(CommandsTest, ABadTextileValueIsNamed) {

@@ -5,12 +5,12 @@
 #include <array>
 
 #include "client/commands/commands.h"
+#include "client/output/text.h"
 #include "client/problem.h"
 
 namespace weft::client {
 namespace {
 
-constexpr std::size_t kLine = 80;        // columns that a terminal has at least
 constexpr std::size_t kNameColumn = 14;  // of a command, before what it does
 constexpr std::size_t kOptionColumn = 30;
 
@@ -144,23 +144,6 @@ const Topic* find_topic(const std::vector<std::string>& words) {
     return words.size() == 1 && words[0] == topic.name;
   });
   return found == kTopics.end() ? nullptr : &*found;
-}
-
-// Lines that are longer go on below, where their last column begins.
-std::string wrapped(const std::string& text) {
-  std::string result;
-  for (std::string line : CLI::detail::split(text, '\n')) {
-    while (line.size() > kLine) {
-      const std::size_t gap = line.rfind("  ", kLine);
-      const std::size_t margin = line.find_first_not_of(' ', gap == std::string::npos ? 0 : gap);
-      const std::size_t end = line.rfind(' ', kLine);
-      if (end == std::string::npos || end <= margin) break;
-      result += line.substr(0, end) + '\n';
-      line = std::string(margin, ' ') + line.substr(end + 1);
-    }
-    result += line + '\n';
-  }
-  return result;
 }
 
 class HelpFormatter : public CLI::Formatter {

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "client/connection.h"
+#include "client/weft.h"
 #include "server/config.h"
 #include "tests/client/client_test.h"
 
@@ -16,6 +17,7 @@ using ::testing::Contains;
 using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Le;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 using CommandsTest = ClientTest;
@@ -174,6 +176,14 @@ TEST_F(CommandsTest, HelpIsAnAnswer) {
   const Outcome unknown = weft({"help", "knit"});
   EXPECT_EQ(unknown.exit, 2);
   EXPECT_THAT(unknown.err, HasSubstr("there is no command or topic \"knit\""));
+}
+
+TEST_F(CommandsTest, TheLastLookOfTopStaysOnATerminal) {
+  std::ostringstream out, err;
+  const client::Terminal terminal{out, err, true, true};
+  client::run_weft({"top", "--looks", "1", "--interval", "0.01", "--server", address_}, terminal,
+                   {});
+  EXPECT_THAT(out.str(), AllOf(HasSubstr("sessions "), Not(HasSubstr("\x1b[J"))));
 }
 
 TEST_F(CommandsTest, HelpOfEveryCommandAndTopicFits80Columns) {

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
+#include <utility>
 
 #include "client/commands/commands.h"
 #include "client/context.h"
@@ -13,7 +15,8 @@ namespace {
 
 constexpr const char* kDescription = "weft: simulates textiles on a server";
 
-constexpr const char* kFooter = R"(A first run:
+constexpr const char* kFooter = R"(
+A first run:
   weft scene new --template sphere -o scene.json
   weft session create scene.json --id drape
   weft serve drape
@@ -22,16 +25,9 @@ constexpr const char* kFooter = R"(A first run:
   weft render drape.weft -o drape.png
   weft export drape.weft --format obj -o drape
 
-With --embedded no server is needed: it lives within the command, and SESSION is a scene file.
-With --json every answer is one JSON document (watch: one a line), on stderr {"error": ...}.
-
-Exit codes:
-  0    done
-  1    refused by the server, not to be had, or not as expected
-  2    wrong command line
-  3    no connection to the server
-  4    a file cannot be read or written, or is damaged
-  130  interrupted before its end)";
+With --embedded no server is needed: it lives within the command, and SESSION is
+a scene file. With --json every answer is one JSON document (watch: one a line),
+on stderr {"error": ...}. Exit codes: weft help errors.)";
 
 std::string problem_text(const Problem& problem) {
   const auto& violations = problem.violations;
@@ -58,6 +54,52 @@ Problem surplus(const CLI::App& app, const std::string& word) {
                      : command->get_subcommands({}).empty() ? "further argument"
                                                             : "command";
   return usage_problem(fmt::format("{} has no {} {}; see {} --help", name, what, word, name));
+}
+
+// Fields of requests that options and arguments of other names stand for.
+constexpr std::array kNames{std::pair{"start_frame", "--from"},
+                            std::pair{"end_frame", "--to"},
+                            std::pair{"until_frame", "--to"},
+                            std::pair{"target_m", "--to"},
+                            std::pair{"duration_s", "--over"},
+                            std::pair{"session_id", "--id"},
+                            std::pair{"snapshot_id", "--id"},
+                            std::pair{"name", "SNAPSHOT"},
+                            std::pair{"name", "SESSION"},
+                            std::pair{"textile.preset", "--preset"},
+                            std::pair{"textile.preset", "--textile"}};
+
+// What the command line has for a field of a request; else the field.
+std::string given_name(const CLI::App& app, const std::string& field) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().front();
+  // "target_m" of "actions[1].drag.target_m.x"
+  std::string own = field;
+  if (own.starts_with("actions[")) {
+    own.erase(0, own.find('.', own.find('.') + 1) + 1);
+    own.erase(std::min(own.find('.'), own.size()));
+  }
+  std::string same = "--" + own;
+  std::replace(same.begin(), same.end(), '_', '-');
+  if (command->get_option_no_throw(same) != nullptr) return same;
+  for (const auto& [known, name] : kNames)
+    if (own == known && command->get_option_no_throw(name) != nullptr) return name;
+  return field;
+}
+
+// In the words of the command line.
+Problem as_given(const CLI::App& app, const Problem& problem) {
+  std::string message = problem.what();
+  std::vector<Violation> violations = problem.violations;
+  for (Violation& violation : violations) {
+    const std::string name = given_name(app, violation.field);
+    if (message.starts_with(violation.field + ':'))
+      message.replace(0, violation.field.size(), name);
+    violation.field = name;
+  }
+  Problem given(problem.exit, problem.code, problem.reason, message);
+  given.violations = std::move(violations);
+  return given;
 }
 
 int report(const Problem& problem, const Context& context) {
@@ -130,12 +172,11 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
                  arguments.end();  // for usage errors too
   CLI::App app(kDescription, "weft");
   app.fallthrough();
-  app.get_formatter()->column_width(36);
-  app.footer(
-      "--server, --token-file, --tls-ca, --embedded and --json go with every command: weft --help");
+  app.formatter(help_formatter());
+  app.footer("--server, --token-file, --tls-ca, --embedded and --json: see weft --help");
   add_options(app, context);
   add_commands(app, context);
-  app.footer(kFooter);  // the commands keep the line above
+  app.footer(topics_text() + kFooter);  // the commands keep the line above
 
   try {
     if (arguments.size() > 1 && arguments[0] == "completion" && arguments[1] == "words") {
@@ -158,7 +199,7 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
     if (error.get_exit_code() == 0) return app.exit(error, terminal.out, terminal.err);
     return report(usage_problem(std::string(error.what()) + "; see --help"), context);
   } catch (const Problem& problem) {
-    return report(problem, context);
+    return report(as_given(app, problem), context);
   } catch (const std::exception& error) {
     return report({Exit::kRefused, "INTERNAL", "INTERNAL", error.what()}, context);
   }

@@ -35,8 +35,8 @@ void run_act(Context& context, ActOptions options) {
 }  // namespace
 
 void add_act(CLI::App& app, Context& context) {
-  CLI::App* act = add_group(
-      app, "act", "Grab, drag, release and pin particles, and move colliders, of a session");
+  CLI::App* act =
+      add_group(app, "act", "Grab, drag, release and pin particles, and move colliders");
   const auto add = [&](const char* name, const char* kind, const char* description) {
     auto options = std::make_shared<ActOptions>();
     options->action.kind = kind;

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -42,9 +43,13 @@ void add_load(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
 void add_completion(CLI::App& app, Context& context);
 void add_help(CLI::App& app);
-// What `weft scene new --help` says, of the words "scene", "new". Throws where there is no such
-// command.
+// What `weft scene new --help` says, of the words "scene", "new"; or of a topic. Throws where there
+// is neither.
 std::string help_of(const CLI::App& app, const std::vector<std::string>& words);
+std::vector<std::string> help_topics();
+std::string topics_text();  // their list
+// Fits 80 columns.
+std::shared_ptr<CLI::FormatterBase> help_formatter();
 // What may stand for the last of the words after "weft", a line each.
 std::string completions(CLI::App& app, std::vector<std::string> words, Context& context);
 

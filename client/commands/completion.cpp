@@ -75,6 +75,8 @@ std::vector<std::string> sessions(Context& context) {
 
 std::vector<std::string> candidates(const CLI::App& app, std::span<const std::string> words,
                                     Context& context) {
+  const bool helps = words.size() > 1 && words[0] == "help";
+  if (helps) words = words.subspan(1);
   const CLI::App* command = &app;
   const CLI::Option* option = nullptr;  // whose value comes next
   for (const std::string& word : words.first(words.size() - 1)) {
@@ -96,7 +98,11 @@ std::vector<std::string> candidates(const CLI::App& app, std::span<const std::st
     return found;
   }
   for (const CLI::App* each : command->get_subcommands({})) found.push_back(each->get_name());
-  if (names_session(*command)) return sessions(context);
+  if (names_session(*command) && !helps) return sessions(context);
+  if (helps && command == &app) {
+    if (words.size() > 1) return {};  // below a topic
+    for (const std::string& topic : help_topics()) found.push_back(topic);
+  }
   return found;
 }
 

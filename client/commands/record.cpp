@@ -103,7 +103,7 @@ void add_record(CLI::App& app, Context& context) {
       ->capture_default_str();
   command->add_flag("--force", order.replace, "Replace a file that exists");
   command->footer(
-      "Without --to and --until-rest it ends when the session, having advanced, is paused.\n"
+      "Without --to and --until-rest it ends when the session, having advanced, is\npaused. "
       "Ctrl-C ends it at any time; the file holds what came so far.");
   command->callback([&context, options] { run_record(context, *options); });
 }

@@ -61,12 +61,9 @@ void run_render(Context& context, const RenderOptions& options) {
                 {"frames", result.frames},
                 {"grid_m", result.grid_m}};
   std::string colours;
-  if (order.colouring == Colouring::kStrain) {
-    document["largest_strain"] = result.most;
-    colours = ", strain up to " + percent_text(result.most);
-  } else if (order.colouring == Colouring::kSpeed) {
-    document["largest_speed_m_per_s"] = result.most;
-    colours = fmt::format(", speed up to {} m/s", number_text(result.most));
+  if (const ColourScale* scale = scale_of(order.colouring)) {
+    document[scale->field] = result.most;
+    colours = fmt::format(", {} up to {}", scale->name, scale->text(result.most));
   }
   const auto shown = static_cast<std::int64_t>(result.frames.size() * result.frames[0].size());
   context.answer(document, fmt::format("{}: {} x {} pixels, {}{}\n", order.path, result.size.width,
@@ -76,8 +73,10 @@ void run_render(Context& context, const RenderOptions& options) {
 }  // namespace
 
 void add_render(CLI::App& app, Context& context) {
-  const std::map<std::string, Colouring> colourings{
-      {"cloth", Colouring::kCloth}, {"strain", Colouring::kStrain}, {"speed", Colouring::kSpeed}};
+  const std::map<std::string, Colouring> colourings{{"cloth", Colouring::kCloth},
+                                                    {"strain", Colouring::kStrain},
+                                                    {"speed", Colouring::kSpeed},
+                                                    {"bending", Colouring::kBending}};
   auto options = std::make_shared<RenderOptions>();
   RenderOrder& order = options->order;
   CLI::App* command = app.add_subcommand("render", "Make a picture of frames of recordings");
@@ -100,9 +99,10 @@ void add_render(CLI::App& app, Context& context) {
   command
       ->add_option("--colour", order.colouring,
                    "cloth: a front and a back\nstrain: the largest at each particle\n"
-                   "speed: of each particle since the frame before")
+                   "speed: of each particle since the frame before\n"
+                   "bending: energy for each area, by the rigidities of the textile at the start")
       ->transform(one_of(colourings))
-      ->option_text("cloth|strain|speed");
+      ->option_text("cloth|strain|speed|bending");
   command
       ->add_option("--azimuth", order.outlook.azimuth,
                    "Seen from the front (0), from the right (90); else 30")

@@ -30,8 +30,8 @@ void run_replay(Context& context, const ReplayOptions& options) {
 
 void add_replay(CLI::App& app, Context& context) {
   auto options = std::make_shared<ReplayOptions>();
-  CLI::App* command = app.add_subcommand(
-      "replay", "Serve a recording as the session it was, as if it ran now, until Ctrl-C");
+  CLI::App* command =
+      app.add_subcommand("replay", "Serve a recording as the session it was, until Ctrl-C");
   command->add_option("FILE", options->file, "Recording")->option_text(" ")->required();
   command->add_option("--listen", options->listen, "Where it is served, instead of by weftd")
       ->type_name("HOST:PORT")
@@ -47,8 +47,9 @@ void add_replay(CLI::App& app, Context& context) {
   command->add_flag("--insecure", options->insecure,
                     "Allow a host other machines can reach, unencrypted");
   command->footer(
-      "What reads a session reads it: weft watch, record and serve, and clients in any language.\n"
-      "It can be run, paused and stepped; what would change it is refused (REPLAY).");
+      "What reads a session reads it: weft watch, record and serve, and clients in any\n"
+      "language. It can be run, paused and stepped; what would change it is refused\n"
+      "(REPLAY).");
   command->callback([&context, options] { run_replay(context, *options); });
 }
 

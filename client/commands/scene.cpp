@@ -92,8 +92,8 @@ void add_new(CLI::App& scene, Context& context) {
 
 void add_check(CLI::App& scene, Context& context) {
   auto path = std::make_shared<std::string>();
-  CLI::App* command = scene.add_subcommand(
-      "check", "Say what the solver would do for a scene, or all that is wrong with it");
+  CLI::App* command =
+      scene.add_subcommand("check", "Say what the solver would do, or all that is wrong");
   command->alias("explain");
   command->add_option("FILE", *path, "Scene file")->option_text(" ")->required();
   command->callback([&context, path] { run_check(context, *path); });

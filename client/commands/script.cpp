@@ -114,8 +114,8 @@ void run_script(Context& context, const ScriptOptions& options) {
 constexpr const char* kFooter =
     R"(A script is YAML; all that is wrong with it is said before anything runs:
 
-  for: {textile: [denim_11oz, wool_tropical], rows: [11, 21]}   # every combination is a case
-  parallel: 2                                                   # cases at a time
+  for: {textile: [denim_11oz, wool_tropical], rows: [11, 21]}  # cases: all pairs
+  parallel: 2                                                  # cases at a time
   variables: {longest: 10}
   steps:
     - create: {template: sphere, textile: $textile, rows: $rows, columns: $rows}
@@ -123,23 +123,28 @@ constexpr const char* kFooter =
     - run: {until_rest: true, until_time_s: $longest}
     - expect: {at_rest: true, largest_strain: {max: 0.05}}
 
-create   template, with the options of `weft scene new`, or scene; fields: {PLACE: VALUE ...}
+create   template, with the options of `weft scene new`, or scene;
+         fields: {PLACE: VALUE ...}
 set      preset or fields: {FIELD: VALUE ...}; sheet; over_s, else at once
 grab     row, column; sheet; likewise release, pin and unpin
-drag     row, column; sheet; to_m: [X, Y, Z]; over_s; moves as the session runs on
+drag     row, column; sheet; to_m: [X, Y, Z]; over_s; moves as it runs on
 move     collider; to_m, an offset from its start; over_s
 record   file; velocities, encoding; to the end of the case
-run      until_frame, until_time_s, until_rest; time_scale; wait: false goes on at once
+run      until_frame, until_time_s, until_rest; time_scale;
+         wait: false goes on at once
 wait     frame
 pause    stops what runs
-expect   frame, time_s, at_rest, rest_time_s, largest_strain (of all frames), strain,
-         kinetic_energy_j, potential_energy_j, energy_j (of the newest),
+snapshot snapshot: a name; keeps the session as it is now
+restore  snapshot; session: a new one that goes on from there
+expect   frame, time_s, at_rest, rest_time_s; largest_strain, of all frames;
+         strain, kinetic_energy_j, potential_energy_j, energy_j, of the newest;
          particle: {sheet, row, column, x_m, y_m, z_m};
          each a value, {min, max} or {near, within}
 
-Each has `session`, a name within the case, needed only where there are several; run takes a list
-of them. A step may be a loop: {for: {...}, steps: [...]}. $NAME and $(NAME) stand for variables,
-$case for the case's name. Paths are relative to the script. Sessions end with their case.)";
+Each has `session`, a name within the case, needed only where there are several;
+run takes a list of them. A step may be a loop: {for: {...}, steps: [...]}.
+$NAME and $(NAME) stand for variables, $case for the case's name. Paths are
+relative to the script. Sessions end with their case.)";
 
 }  // namespace
 

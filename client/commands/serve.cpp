@@ -40,8 +40,8 @@ void run_serve(Context& context, const ServeOptions& options) {
 
 void add_serve(CLI::App& app, Context& context) {
   auto options = std::make_shared<ServeOptions>();
-  CLI::App* command = app.add_subcommand(
-      "serve", "Show sessions in a browser while they run, and drive them there, until Ctrl-C");
+  CLI::App* command =
+      app.add_subcommand("serve", "Show sessions in a browser and drive them there, until Ctrl-C");
   command
       ->add_option("SESSION", options->session,
                    "Session to show first (with --embedded: a scene file)")

@@ -133,8 +133,8 @@ void add_session(CLI::App& app, Context& context) {
   command->callback([&context, of] { run_snapshots(context, *of); });
 
   auto restore = std::make_shared<RestoreOptions>();
-  command = session->add_subcommand(
-      "restore", "Make a session that goes on from a snapshot of another, which stays as it is");
+  command =
+      session->add_subcommand("restore", "Make a session that goes on from a snapshot of another");
   add_session_argument(*command, restore->session);
   command->add_option("SNAPSHOT", restore->snapshot, "Name of the snapshot, such as frame-120")
       ->option_text(" ")

@@ -17,12 +17,10 @@ void list_textiles(Context& context) {
   Table table({"NAME", "TEXTILE", "kg/m^2", "STATUS"});
   for (const auto& textile : all.textiles()) {
     const std::string name = textile.name().substr(textile.name().find('/') + 1);
-    const std::string lacks = textile.missing().empty()
-                                  ? ""
-                                  : fmt::format("incomplete: {} missing", textile.missing_size());
+    const std::string status = textile.status().substr(0, textile.status().find(" ("));
     table.add({name, textile.display_name(),
                number_text(textile.values().areal_density_kg_per_m2()),
-               lacks.empty() ? textile.status() : lacks});
+               textile.missing().empty() ? status : "incomplete"});
   }
   context.answer(to_json(all), table.text());
 }
@@ -53,17 +51,17 @@ void run_show(Context& context, const std::string& name) {
   if (!textile.missing().empty())
     facts.add("missing", fmt::format("{}", fmt::join(textile.missing(), ", ")));
   if (!textile.note().empty()) facts.add("note", textile.note());
-  Table table({"FIELD", "VALUE IN SI", "AS GIVEN", "UNIT", "STATUS", "SOURCE"});
+  Table table({"FIELD", "SI", "GIVEN", "UNIT", "STATUS"});
   std::vector<std::string> sources;
   for (const auto& property : textile.properties()) {
     table.add({property.field(), si_text(textile.values(), property.field()), property.value(),
-               property.unit(), property.status(),
-               fmt::format("[{}]", place_in(sources, property.source()))});
+               property.unit(),
+               fmt::format("{} [{}]", property.status(), place_in(sources, property.source()))});
   }
   std::string notes;
   for (std::size_t i = 0; i < sources.size(); ++i)
-    notes += fmt::format("[{}] {}\n", i + 1, sources[i]);
-  context.answer(to_json(textile), facts.text() + '\n' + table.text() + '\n' + notes);
+    notes += fmt::format("[{}]  {}\n", i + 1, sources[i]);
+  context.answer(to_json(textile), facts.text() + '\n' + table.text() + '\n' + wrapped(notes));
 }
 
 struct SetOptions {

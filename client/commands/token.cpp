@@ -59,8 +59,8 @@ void run_token(Context& context, const TokenOptions& options) {
 
 void add_token(CLI::App& app, Context& context) {
   auto options = std::make_shared<TokenOptions>();
-  CLI::App* command = app.add_subcommand(
-      "token", "Make a token, and print the line for weftd --tokens that knows it by its hash");
+  CLI::App* command =
+      app.add_subcommand("token", "Make a token, and the line for weftd --tokens with its hash");
   command->add_option("PRINCIPAL", options->principal, "Whose it is")->option_text(" ")->required();
   command->add_option("-o,--output", options->output, "Where the token goes, for --token-file")
       ->type_name("FILE")

@@ -116,7 +116,7 @@ void show(Context& context, Status& status, const Look& now, const Look& before)
   std::vector<std::string> lines;
   std::istringstream stream(text);
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  status.show(lines);
+  status.show(std::move(lines));
 }
 
 // False: stopped meanwhile.
@@ -133,11 +133,12 @@ void run_top(Context& context, const TopOptions& options) {
   Status status(context.terminal.out, context.terminal.out_is_watched && !context.json);
   Look before = look_at(connection);
   for (int look = 0; !options.looks || look < *options.looks; ++look) {
-    if (!pause_for(context.stop, options.interval_s)) return;
+    if (!pause_for(context.stop, options.interval_s)) break;
     Look now = look_at(connection);
     show(context, status, now, before);
     before = std::move(now);
   }
+  status.keep();
 }
 
 }  // namespace

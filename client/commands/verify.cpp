@@ -33,7 +33,7 @@ void run_verify(Context& context, const std::string& path) {
 void add_verify(CLI::App& app, Context& context) {
   auto path = std::make_shared<std::string>();
   CLI::App* command = app.add_subcommand(
-      "verify", "Read all of a recording and hold it to its checksums, or say all that is wrong");
+      "verify", "Hold all of a recording to its checksums, or say what is wrong");
   command->add_option("FILE", *path, "Recording")->option_text(" ")->required();
   command->callback([&context, path] { run_verify(context, *path); });
 }

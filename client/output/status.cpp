@@ -1,14 +1,38 @@
 #include "client/output/status.h"
 
+#include <sys/ioctl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 
 namespace weft::client {
+namespace {
 
-void Status::show(const std::vector<std::string>& lines) {
+// What the terminal would wrap or scroll could not be taken away again.
+void fit(std::vector<std::string>& lines) {
+  winsize size{};
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 && ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0)
+    return;
+  if (size.ws_row > 2 && lines.size() >= size.ws_row) {
+    lines.resize(size.ws_row - 1U);
+    lines.back() = "...";
+  }
+  for (std::string& line : lines) {
+    if (size.ws_col == 0 || line.size() <= size.ws_col) continue;
+    std::size_t end = size.ws_col;
+    while ((static_cast<unsigned char>(line[end]) & 0xC0U) == 0x80U) --end;  // within a character
+    line.resize(end);
+  }
+}
+
+}  // namespace
+
+void Status::show(std::vector<std::string> lines) {
   const auto now = std::chrono::steady_clock::now();
   if (!watched_ || (shown_ > 0 && now - last_ < std::chrono::milliseconds(100))) return;
   clear();
+  fit(lines);
   for (const auto& line : lines) out_ << line << '\n';
   out_ << std::flush;
   shown_ = lines.size();

@@ -16,10 +16,12 @@ class Status {
   Status(const Status&) = delete;
   Status& operator=(const Status&) = delete;
 
-  // Shows these lines instead, at most ten times a second.
-  void show(const std::vector<std::string>& lines);
+  // Shows these lines instead, at most ten times a second, as far as they fit the terminal.
+  void show(std::vector<std::string> lines);
   // Takes the lines away, so that something else can be written.
   void clear();
+  // Leaves them for good.
+  void keep() { shown_ = 0; }
 
  private:
   std::ostream& out_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <sstream>
 
 namespace weft::client {
 namespace {
@@ -47,6 +48,24 @@ std::string percent_text(double fraction) { return fmt::format("{:.3g} %", fract
 
 std::string number_text(double number) { return fmt::format("{:.4g}", number); }
 
+std::string wrapped(const std::string& text) {
+  constexpr std::size_t kLine = 80;
+  std::string result;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    while (line.size() > kLine) {
+      const std::size_t gap = line.rfind("  ", kLine);
+      const std::size_t margin = line.find_first_not_of(' ', gap == std::string::npos ? 0 : gap);
+      const std::size_t end = line.rfind(' ', kLine);
+      if (end == std::string::npos || end <= margin) break;  // a long word
+      result += line.substr(0, end) + '\n';
+      line = std::string(margin, ' ') + line.substr(end + 1);
+    }
+    result += line + '\n';
+  }
+  return result;
+}
+
 Facts& Facts::add(std::string label, std::string value) {
   rows_.emplace_back(std::move(label), std::move(value));
   return *this;
@@ -62,7 +81,7 @@ std::string Facts::text() const {
     text += without_trailing_spaces(fmt::format("{:{}}  {}", shown, width, value)) + '\n';
     previous = label;
   }
-  return text;
+  return wrapped(text);
 }
 
 std::string Table::text() const {

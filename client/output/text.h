@@ -19,7 +19,10 @@ std::string percent_text(double fraction);
 // Four significant digits.
 std::string number_text(double number);
 
-// Label and value, one pair a line, values aligned; a label that repeats is shown once.
+// The text within 80 columns: longer lines go on below, where their last column begins.
+std::string wrapped(const std::string& text);
+
+// Label and value, one pair a line, values aligned and wrapped; a label that repeats is shown once.
 class Facts {
  public:
   Facts& add(std::string label, std::string value);

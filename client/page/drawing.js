@@ -118,6 +118,39 @@ function writeStrains(sheets, out, p) {
   }
 }
 
+// Energy for each area, J/m^2: of the curvatures along warp and weft and of the twist, by the rigidities of the
+// textile, whatever the bending law. Differences as in the isometric law; a particle's twist is the mean of its cells.
+function writeBending(sheets, out, p) {
+  out.fill(0);
+  for (const {first_particle, rows, columns, spacing_m, textile: {measured, raw}} of sheets) {
+    const warp = measured ? measured.bend_rigidity_warp_n_m : 1.5 * raw.bend_n_m2 / spacing_m;
+    const weft = measured ? measured.bend_rigidity_weft_n_m : warp;
+    const squaredCurvature = (a, b, c, d) => {
+      let sum = 0;
+      for (let axis = 0; axis < 3; ++axis) {
+        sum += (p[3 * a + axis] - p[3 * b + axis] - p[3 * c + axis] + p[3 * d + axis]) ** 2;
+      }
+      return sum / spacing_m ** 4;
+    };
+    const isInside = (i, count) => i > 0 && i + 1 < count;
+    for (let row = 0; row < rows; ++row) {
+      for (let column = 0; column < columns; ++column) {
+        const i = first_particle + row * columns + column;
+        if (isInside(column, columns)) out[i] += warp / 2 * squaredCurvature(i - 1, i, i, i + 1);
+        if (isInside(row, rows)) out[i] += weft / 2 * squaredCurvature(i - columns, i, i, i + columns);
+        if (row + 1 === rows || column + 1 === columns) continue;
+        const twist = (warp + weft) / 2 * squaredCurvature(i, i + 1, i + columns, i + columns + 1);
+        for (const r of [row, row + 1]) {
+          for (const c of [column, column + 1]) {
+            const cells = (isInside(r, rows) ? 2 : 1) * (isInside(c, columns) ? 2 : 1);
+            out[first_particle + r * columns + c] += twist / cells;
+          }
+        }
+      }
+    }
+  }
+}
+
 const kQuantities = {
   strain: {
     title: 'Strain, largest at a particle',
@@ -128,6 +161,11 @@ const kQuantities = {
     title: 'Speed of a particle',
     text: (value) => `${value.toPrecision(3)} m/s`,
     write: (source, out, positions, frame) => source.writeSpeeds(out, frame),
+  },
+  bending: {
+    title: 'Bending energy for each area',
+    text: (value) => `${digits(value)} J/m²`,
+    write: (source, out, positions) => writeBending(source.sheets, out, positions),
   },
 };
 

@@ -173,6 +173,7 @@ class Live extends Stage {
   async updateTextile(change) {
     const answer = await attempt(() => session('UpdateTextile', {name: this.name, ...change}));
     if (!answer) throw new Error('refused');
+    this.stale = true;  // bending energy has other colours
     return answer;
   }
 

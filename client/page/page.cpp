@@ -132,7 +132,8 @@ Json sheets_json(const RecordingReader& recording) {
                       {"rows", layout.rows()},
                       {"columns", layout.columns()},
                       {"spacing_m", sheet.grid().spacing_m()},
-                      {"pinned", std::move(pinned)}});
+                      {"pinned", std::move(pinned)},
+                      {"textile", to_json(sheet.textile())}});
   }
   return sheets;
 }

@@ -73,12 +73,13 @@ class Sight {
       ...layout,
       spacing_m: scene.sheets[k].grid.spacing_m,
       pinned: scene.sheets[k].pins.flatMap(({particles}) => particles),
+      get textile() { return scene.sheets[k].textile; },  // as it is now
     }));
     this.particles = this.sheets.reduce((sum, {rows, columns}) => sum + rows * columns, 0);
     this.colliders = scene.colliders;
     this.gravity_m_per_s2 = scene.environment.gravity_m_per_s2;
     this.origin_m = [0, 0, 0];
-    this.most = {strain: 0, speed: 0};  // so far
+    this.most = {strain: 0, speed: 0, bending: 0};  // so far
   }
 
   take({frame, positions}) {

@@ -124,8 +124,9 @@ function showFacts(figure, recordings, gridCell) {
   const error = Math.max(...recordings.map(({quantum_m}) => quantum_m / 2));
   const grid = gridCell >= 1 ? `${gridCell} m` : `${Number((1000 * gridCell).toPrecision(2))} mm`;
   $('precision').textContent = `Positions on this page are within ${(1e6 * error).toPrecision(2)} µm of the ` +
-    `recording along each axis; strain and speed are computed from them. While it plays, positions between ` +
-    `two frames are interpolated. The grid has cells of ${grid}.`;
+    `recording along each axis; strain, speed and bending energy are computed from them, the energy by the ` +
+    `rigidities of the textile at the start. While it plays, positions between two frames are interpolated. ` +
+    `The grid has cells of ${grid}.`;
 }
 
 function showTime(viewer) {

@@ -172,10 +172,6 @@ Survey survey_of(std::vector<RecordingReader>& recordings,
   return survey;
 }
 
-std::string value_text_of(Colouring colouring, double value) {
-  return colouring == Colouring::kStrain ? percent_text(value) : number_text(value) + " m/s";
-}
-
 // Text that is made smaller where it is too long.
 void write_within(Picture& picture, const std::string& text, float size, float x, float y,
                   float width, const Colour& colour) {
@@ -184,10 +180,10 @@ void write_within(Picture& picture, const std::string& text, float size, float x
 }
 
 // The ramp, what it means, and its ends.
-void draw_legend(Picture& picture, const Studio& studio, const Area& area, float text) {
-  const std::string title =
-      studio.colouring == Colouring::kStrain ? "strain, largest at a particle" : "speed";
-  const std::string most = value_text_of(studio.colouring, studio.most);
+void draw_legend(Picture& picture, const ColourScale& scale, double largest, const Area& area,
+                 float text) {
+  const std::string title = scale.title;
+  const std::string most = scale.text(largest);
   const float width =
       std::min(std::max(text_width(title, text), 12 * text), 0.5F * static_cast<float>(area.width));
   const float right = static_cast<float>(area.x + area.width) - text;
@@ -204,6 +200,27 @@ void draw_legend(Picture& picture, const Studio& studio, const Area& area, float
 
 }  // namespace
 
+const ColourScale* scale_of(Colouring colouring) {
+  static constexpr ColourScale kStrain{"strain", "strain, largest at a particle", "largest_strain",
+                                       percent_text};
+  static constexpr ColourScale kSpeed{"speed", "speed", "largest_speed_m_per_s",
+                                      [](double value) { return number_text(value) + " m/s"; }};
+  static constexpr ColourScale kBending{"bending energy", "bending energy",
+                                        "largest_bending_energy_j_per_m2",
+                                        [](double value) { return number_text(value) + " J/m²"; }};
+  switch (colouring) {
+    case Colouring::kCloth:
+      break;
+    case Colouring::kStrain:
+      return &kStrain;
+    case Colouring::kSpeed:
+      return &kSpeed;
+    case Colouring::kBending:
+      return &kBending;
+  }
+  return nullptr;
+}
+
 RenderResult render(const RenderOrder& order,
                     const std::function<void(const std::string& doing)>& progress,
                     const std::stop_token& stop) {
@@ -215,10 +232,10 @@ RenderResult render(const RenderOrder& order,
   const float text = std::clamp(
       static_cast<float>(std::min(layout.tile_height(), layout.tile_width())) / 32, 8.0F, 48.0F);
   const bool names = recordings.size() > 1;
-  const bool legend = order.colouring != Colouring::kCloth;
+  const ColourScale* legend = scale_of(order.colouring);
   progress("looking at the frames");
   const Survey survey = survey_of(recordings, result.frames, order, layout,
-                                  margins_of(layout, text, legend, names), stop);
+                                  margins_of(layout, text, legend != nullptr, names), stop);
 
   Picture picture(layout.size.width, layout.size.height);
   for (int y = 0; y < picture.height(); ++y)
@@ -245,11 +262,11 @@ RenderResult render(const RenderOrder& order,
                    fmt::format("frame {}, {}, grid {} m", number, seconds_text(stage.time_s),
                                number_text(survey.studio.grid)),
                    text, left, static_cast<float>(area.y + area.height) - text,
-                   legend ? width / 2.5F : width, kQuietInk);
+                   legend != nullptr ? width / 2.5F : width, kQuietInk);
       ++place;
     }
   }
-  if (legend) draw_legend(picture, survey.studio, area, text);
+  if (legend != nullptr) draw_legend(picture, *legend, survey.studio.most, area, text);
 
   OutputFile file(order.path);
   file.write(picture.png());

@@ -32,6 +32,16 @@ struct RenderOrder {
   Colouring colouring = Colouring::kCloth;
 };
 
+// How the values of a colouring are told.
+struct ColourScale {
+  const char* name;
+  const char* title;  // in a picture
+  const char* field;  // the largest, in JSON
+  std::string (*text)(double value);
+};
+// None of cloth.
+const ColourScale* scale_of(Colouring colouring);
+
 struct RenderResult {
   Size size;
   std::vector<std::vector<std::int64_t>> frames;  // of each recording

@@ -97,6 +97,48 @@ std::vector<double> strains_of(const v1::SheetLayout& sheet, const Points& point
   return strains;
 }
 
+// Along warp and weft, N m; core/model/mesh.cpp has them of a raw textile.
+std::pair<double, double> rigidities_of(const v1::Textile& textile, double spacing_m) {
+  const v1::MeasuredTextile& measured = textile.measured();
+  if (textile.has_measured())
+    return {measured.bend_rigidity_warp_n_m(), measured.bend_rigidity_weft_n_m()};
+  const double rigidity = 1.5 * textile.raw().bend_n_m2() / spacing_m;
+  return {rigidity, rigidity};
+}
+
+// Differences as in the isometric law; a particle's twist is the mean of its cells.
+std::vector<double> bending_of(const v1::SheetLayout& sheet, const Points& points,
+                               const v1::Textile& textile, double spacing_m) {
+  const auto [warp, weft] = rigidities_of(textile, spacing_m);
+  const auto squared_curvature = [&](std::size_t a, std::size_t b, std::size_t c, std::size_t d) {
+    double sum = 0;
+    for (const std::vector<double>* axis : {&points.x, &points.y, &points.z})
+      sum += std::pow((*axis)[a] - (*axis)[b] - (*axis)[c] + (*axis)[d], 2);
+    return sum / std::pow(spacing_m, 4);
+  };
+  std::vector<double> energies(points.x.size());
+  const auto rows = static_cast<std::size_t>(sheet.rows());
+  const auto columns = static_cast<std::size_t>(sheet.columns());
+  const auto is_inside = [](std::size_t i, std::size_t count) { return i > 0 && i + 1 < count; };
+  for (std::size_t i = 0; i < energies.size(); ++i) {
+    const std::size_t row = i / columns;
+    const std::size_t column = i % columns;
+    if (is_inside(column, columns)) energies[i] += warp / 2 * squared_curvature(i - 1, i, i, i + 1);
+    if (is_inside(row, rows))
+      energies[i] += weft / 2 * squared_curvature(i - columns, i, i, i + columns);
+    if (row + 1 == rows || column + 1 == columns) continue;
+    const double twist =
+        (warp + weft) / 2 * squared_curvature(i, i + 1, i + columns, i + columns + 1);
+    for (const std::size_t r : {row, row + 1}) {
+      for (const std::size_t c : {column, column + 1}) {
+        const int cells = (is_inside(r, rows) ? 2 : 1) * (is_inside(c, columns) ? 2 : 1);
+        energies[r * columns + c] += twist / cells;
+      }
+    }
+  }
+  return energies;
+}
+
 // What lies between the particles is led out of bodies that the particles themselves keep off.
 void keep_off(Points& points, const v1::SheetLayout& sheet, int pieces,
               const std::vector<Body>& bodies, double skin_m, double spacing_m) {
@@ -146,6 +188,8 @@ Stage read_stage(RecordingReader& recording, std::int64_t number, Colouring colo
     const double spacing_m = sheet.grid().spacing_m();
     std::vector<double> values(count);
     if (colouring == Colouring::kStrain) values = strains_of(layout, points, spacing_m);
+    if (colouring == Colouring::kBending)
+      values = bending_of(layout, points, sheet.textile(), spacing_m);
     if (colouring == Colouring::kSpeed && step_s > 0) {
       const Points others = read_points(before.positions_m(), header, first, count);
       for (std::size_t k = 0; k < count; ++k) values[k] = distance(points, k, others, k) / step_s;

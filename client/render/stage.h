@@ -13,9 +13,11 @@ namespace weft::client {
 
 // What the cloth's colours mean.
 enum class Colouring {
-  kCloth,   // nothing: a front and a back
-  kStrain,  // largest strain of a particle's stretch connections, 0 where none is stretched
-  kSpeed,   // m/s, on the way from the frame before; of the first frame 0
+  kCloth,    // nothing: a front and a back
+  kStrain,   // largest strain of a particle's stretch connections, 0 where none is stretched
+  kSpeed,    // m/s, on the way from the frame before; of the first frame 0
+  kBending,  // energy, J/m^2, whatever the bending law: of the curvatures along warp and weft and
+             // of the twist, by the rigidities that the textile had when the recording began
 };
 
 // A sheet as it is drawn: between the particles, where there are few, by bicubic interpolation

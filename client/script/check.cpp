@@ -13,6 +13,13 @@
 namespace weft::client {
 namespace {
 
+// A session as it would be.
+struct Known {
+  std::optional<v1::Session> session{};                   // none where the server refuses it
+  std::set<std::tuple<std::string, int, int>> grabbed{};  // sheet, row, column
+  std::int64_t snapshots = 0;
+};
+
 class Checker {
  public:
   Checker(Connection& connection, const Script& script, bool replace)
@@ -21,7 +28,7 @@ class Checker {
   void check() {
     for (const Case& each : script_.cases) {
       sessions_.clear();
-      grabbed_.clear();
+      snapshots_.clear();
       for (const Step& step : each.steps)
         std::visit([&](const auto& what) { check_step(step, what); }, step.what);
     }
@@ -52,11 +59,32 @@ class Checker {
   }
 
   void check_step(const Step& step, const CreateStep& what) {
-    sessions_[what.session] = ask(step, what.session, what.scene);
+    sessions_[what.session] = {.session = ask(step, what.session, what.scene)};
+  }
+
+  void check_step(const Step& step, const SnapshotStep& what) {
+    Known& known = sessions_[what.session];
+    if (++known.snapshots == most_snapshots() + 1)
+      fault(step, "", fmt::format("a session keeps at most {} snapshots", most_snapshots()));
+    snapshots_[what.snapshot] = known;
+  }
+
+  void check_step(const Step&, const RestoreStep& what) {
+    Known& known = sessions_[what.session] = snapshots_[what.snapshot];
+    known.snapshots = 0;
+  }
+
+  std::int64_t most_snapshots() {
+    if (!most_snapshots_) {
+      most_snapshots_ = connection_.call(&v1::ServerService::Stub::GetServerInfo, {})
+                            .limits()
+                            .max_snapshots_per_session();
+    }
+    return *most_snapshots_;
   }
 
   void check_step(const Step& step, const SetStep& what) {
-    const auto& session = sessions_[what.session];
+    auto& session = sessions_[what.session].session;
     if (!session) return;  // refused before
     v1::Scene scene = session->scene();
     v1::UpdateTextileRequest request;
@@ -76,7 +104,7 @@ class Checker {
       } else {
         *sheet.mutable_textile() = request.textile();
       }
-      sessions_[what.session] = ask(step, what.session, scene);
+      session = ask(step, what.session, scene);
       return;
     }
     fault(step, ".sheet",
@@ -86,7 +114,7 @@ class Checker {
   }
 
   void check_step(const Step& step, const ActStep& what) {
-    const auto& session = sessions_[what.session];
+    auto& [session, grabbed, snapshots] = sessions_[what.session];
     if (!session) return;
     v1::Action action;
     try {
@@ -94,13 +122,12 @@ class Checker {
     } catch (const Problem& problem) {
       return fault(step, "", problem.what());
     }
-    const auto particle =
-        std::tuple(what.session, what.action.name, what.action.row, what.action.column);
-    if (action.has_grab() && !grabbed_.insert(particle).second)
+    const auto particle = std::tuple(what.action.name, what.action.row, what.action.column);
+    if (action.has_grab() && !grabbed.insert(particle).second)
       fault(step, "", "the particle is grabbed already");
-    if (action.has_drag() && !grabbed_.contains(particle))
+    if (action.has_drag() && !grabbed.contains(particle))
       fault(step, "", "the particle was not grabbed before this");
-    if (action.has_release() && grabbed_.erase(particle) == 0)
+    if (action.has_release() && grabbed.erase(particle) == 0)
       fault(step, "", "the particle was not grabbed before this");
   }
 
@@ -118,7 +145,7 @@ class Checker {
   }
 
   void check_step(const Step& step, const ExpectStep& what) {
-    const auto& session = sessions_[what.session];
+    const auto& session = sessions_[what.session].session;
     if (!session) return;
     for (const Expectation& expectation : what.expectations) {
       if (expectation.quantity != Quantity::kPosition) continue;
@@ -148,10 +175,9 @@ class Checker {
   bool replace_;
   Faults faults_;
   std::map<std::string, std::optional<v1::Session>> asked_;
-  std::map<std::string, std::optional<v1::Session>> sessions_;  // of the case, as they would be
-  // Of the case: session, sheet, row, column.
-  std::set<std::tuple<std::string, std::string, int, int>> grabbed_;
-  std::set<std::string> files_;  // of all cases
+  std::map<std::string, Known> sessions_, snapshots_;  // of the case
+  std::optional<std::int64_t> most_snapshots_;         // of a session
+  std::set<std::string> files_;                        // of all cases
 };
 
 }  // namespace

@@ -126,10 +126,26 @@ class Performer {
   }
 
   void do_step(const Step&, const CreateStep& what) {
-    Actor& actor = actors_[what.session];
-    actor.session = create_session(connection_, what.scene);
-    actor.observer =
-        std::make_unique<Observer>(connection_, actor.session, format_of(case_, what.session));
+    observe(what.session, create_session(connection_, what.scene));
+  }
+
+  void do_step(const Step&, const SnapshotStep& what) {
+    v1::CreateSnapshotRequest request;
+    request.set_parent(actors_.at(what.session).session.name());
+    request.set_snapshot_id(fmt::format("script-{}", snapshots_.size() + 1));
+    snapshots_[what.snapshot] = connection_.call(&Sessions::CreateSnapshot, request).name();
+  }
+
+  void do_step(const Step&, const RestoreStep& what) {
+    v1::RestoreSessionRequest request;
+    request.set_name(snapshots_.at(what.snapshot));
+    observe(what.session, connection_.call(&Sessions::RestoreSession, request));
+  }
+
+  void observe(const std::string& name, v1::Session session) {
+    Actor& actor = actors_[name];
+    actor.session = std::move(session);
+    actor.observer = std::make_unique<Observer>(connection_, actor.session, format_of(case_, name));
   }
 
   void do_step(const Step&, const SetStep& what) {
@@ -245,6 +261,7 @@ class Performer {
   bool replace_;
   const std::function<void(const std::string&)>& progress_;
   std::map<std::string, Actor> actors_;
+  std::map<std::string, std::string> snapshots_;  // their names on the server
   CaseResult result_;
 };
 

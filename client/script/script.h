@@ -15,8 +15,8 @@
 
 namespace weft::client {
 
-// A script is cases, and a case is steps that are done in order. Sessions go by the names the
-// script gives them.
+// A script is cases, and a case is steps that are done in order. Sessions and snapshots go by the
+// names the script gives them.
 
 struct CreateStep {
   std::string session;
@@ -59,6 +59,17 @@ struct RecordStep {
   v1::FrameEncoding encoding = v1::FRAME_ENCODING_FLOAT32;
 };
 
+struct SnapshotStep {
+  std::string session;
+  std::string snapshot;
+};
+
+// Makes a session.
+struct RestoreStep {
+  std::string session;
+  std::string snapshot;
+};
+
 enum class Quantity {
   kFrame,
   kTime,
@@ -92,7 +103,8 @@ struct ExpectStep {
 struct Step {
   int line = 0;
   std::string kind;  // "create"
-  std::variant<CreateStep, SetStep, ActStep, RunStep, WaitStep, PauseStep, RecordStep, ExpectStep>
+  std::variant<CreateStep, SetStep, ActStep, RunStep, WaitStep, PauseStep, RecordStep, SnapshotStep,
+               RestoreStep, ExpectStep>
       what;
 };
 

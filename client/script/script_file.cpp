@@ -126,6 +126,7 @@ class ScriptReader {
     result.values = values;
     scope.variables["case"] = file_name_of(result.name);
     sessions_.clear();
+    snapshots_.clear();
     read_steps(steps, scope, result.steps);
     script_.cases.push_back(std::move(result));
   }
@@ -197,12 +198,20 @@ class ScriptReader {
     return name.value_or("");
   }
 
+  // A name that is given once, among those given before.
+  static std::string new_name(Fields& fields, const char* key, std::vector<std::string>& names,
+                              const char* otherwise = "") {
+    std::string name = fields.text(key).value_or(otherwise);
+    if (name.empty() && !fields.has(key)) fields.fault("", std::string(key) + " is missing");
+    if (std::find(names.begin(), names.end(), name) != names.end())
+      fields.fault(key, fmt::format("there is a {} \"{}\" already", key, name));
+    names.push_back(name);
+    return name;
+  }
+
   What read_create(Fields& fields, Scope& scope) {
     CreateStep step;
-    step.session = fields.text("session").value_or("cloth");
-    if (std::find(sessions_.begin(), sessions_.end(), step.session) != sessions_.end())
-      fields.fault("session", fmt::format("there is a session \"{}\" already", step.session));
-    sessions_.push_back(step.session);
+    step.session = new_name(fields, "session", sessions_, "cloth");
 
     const TemplateOptions options = read_template_options(fields);
     const auto name = fields.text("template");
@@ -385,6 +394,23 @@ class ScriptReader {
     return step;
   }
 
+  What read_snapshot(Fields& fields, Scope&) {
+    return SnapshotStep{.session = read_session(fields),
+                        .snapshot = new_name(fields, "snapshot", snapshots_)};
+  }
+
+  What read_restore(Fields& fields, Scope&) {
+    RestoreStep step{.session = new_name(fields, "session", sessions_),
+                     .snapshot = fields.text("snapshot").value_or("")};
+    if (!fields.has("snapshot")) {
+      fields.fault("", "snapshot is missing");
+    } else if (std::find(snapshots_.begin(), snapshots_.end(), step.snapshot) == snapshots_.end()) {
+      fields.fault("snapshot",
+                   fmt::format("no snapshot \"{}\" was taken before this", step.snapshot));
+    }
+    return step;
+  }
+
   What read_expect(Fields& fields, Scope& scope) {
     constexpr std::array kQuantities{std::pair{"frame", Quantity::kFrame},
                                      std::pair{"time_s", Quantity::kTime},
@@ -469,7 +495,7 @@ class ScriptReader {
     const char* name;
     What (ScriptReader::*read)(Fields&, Scope&);
   };
-  static constexpr std::array<Kind, 13> kKinds{{{"create", &ScriptReader::read_create},
+  static constexpr std::array<Kind, 15> kKinds{{{"create", &ScriptReader::read_create},
                                                 {"set", &ScriptReader::read_set},
                                                 {"grab", &ScriptReader::read_act},
                                                 {"drag", &ScriptReader::read_act},
@@ -481,13 +507,15 @@ class ScriptReader {
                                                 {"wait", &ScriptReader::read_wait},
                                                 {"pause", &ScriptReader::read_pause},
                                                 {"record", &ScriptReader::read_record},
+                                                {"snapshot", &ScriptReader::read_snapshot},
+                                                {"restore", &ScriptReader::read_restore},
                                                 {"expect", &ScriptReader::read_expect}}};
 
   std::string path_;
   const std::map<std::string, std::string>& given_;
   Faults faults_;
   Script script_;
-  std::vector<std::string> sessions_;  // of the case, in order of creation
+  std::vector<std::string> sessions_, snapshots_;  // of the case, in order of creation
   std::size_t steps_read_ = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "client/connection.h"
+#include "client/weft.h"
 #include "server/config.h"
 #include "tests/client/client_test.h"
 
@@ -13,16 +14,25 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::Each;
 using ::testing::HasSubstr;
+using ::testing::Le;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 using CommandsTest = ClientTest;
 
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
 // Lines that are one JSON object each, by protobuf's own parser.
 std::vector<google::protobuf::Struct> json_lines(const std::string& text) {
   std::vector<google::protobuf::Struct> objects;
-  std::istringstream lines(text);
-  for (std::string line; std::getline(lines, line);) {
+  for (const std::string& line : lines_of(text)) {
     const auto status = google::protobuf::util::JsonStringToMessage(line, &objects.emplace_back());
     EXPECT_TRUE(status.ok()) << status.ToString() << " in " << line;
   }
@@ -159,13 +169,51 @@ TEST_F(CommandsTest, TopShowsTheServerAndItsSessions) {
 TEST_F(CommandsTest, HelpIsAnAnswer) {
   const Outcome help = weft({"--help"});
   EXPECT_EQ(help.exit, 0);
-  EXPECT_THAT(help.out, AllOf(HasSubstr("Exit codes"), HasSubstr("record"), HasSubstr("export")));
+  EXPECT_THAT(help.out, AllOf(HasSubstr("\n  units "), HasSubstr("record"), HasSubstr("export")));
   EXPECT_THAT(weft({"record", "--help"}).out, HasSubstr("--until-rest"));
   EXPECT_EQ(weft({"help"}).out, help.out);
   EXPECT_EQ(weft({"help", "scene", "new"}).out, weft({"scene", "new", "--help"}).out);
   const Outcome unknown = weft({"help", "knit"});
   EXPECT_EQ(unknown.exit, 2);
-  EXPECT_THAT(unknown.err, HasSubstr("there is no command \"knit\""));
+  EXPECT_THAT(unknown.err, HasSubstr("there is no command or topic \"knit\""));
+}
+
+TEST_F(CommandsTest, TheLastLookOfTopStaysOnATerminal) {
+  std::ostringstream out, err;
+  const client::Terminal terminal{out, err, true, true};
+  client::run_weft({"top", "--looks", "1", "--interval", "0.01", "--server", address_}, terminal,
+                   {});
+  EXPECT_THAT(out.str(), AllOf(HasSubstr("sessions "), Not(HasSubstr("\x1b[J"))));
+}
+
+TEST_F(CommandsTest, HelpOfEveryCommandAndTopicFits80Columns) {
+  const auto words = [](std::vector<std::string> before) {
+    before.insert(before.begin(), {"completion", "words", "help"});
+    before.emplace_back();
+    return lines_of(run_weft(before).out);
+  };
+  std::vector<std::vector<std::string>> all{{}};
+  for (const std::string& word : words({})) {
+    all.push_back({word});
+    if (word == "help") continue;
+    for (const std::string& below : words({word})) all.push_back({word, below});
+  }
+  EXPECT_GT(all.size(), 60);
+  for (std::vector<std::string>& each : all) {
+    each.insert(each.begin(), "help");
+    const Outcome help = weft(each);
+    EXPECT_EQ(help.exit, 0) << help.err;
+    EXPECT_THAT(lines_of(help.out), Each(SizeIs(Le(80)))) << help.out;
+  }
+}
+
+TEST_F(CommandsTest, TheTopicOnErrorsNamesWhatTheyHave) {
+  const Outcome error = weft({"session", "get", "nobody", "--json"});
+  const auto told = weft({"help", "errors"}).out;
+  EXPECT_THAT(told, HasSubstr("\n  " + std::to_string(error.exit) + "    refused by the server"));
+  const auto fields = nlohmann::json::parse(error.err)["error"];
+  for (const auto& [name, value] : fields.items()) EXPECT_THAT(told, HasSubstr('"' + name + '"'));
+  EXPECT_THAT(told, HasSubstr(fields["reason"].get<std::string>()));
 }
 
 TEST_F(CommandsTest, AWrongCommandLineIsToldWhatThereIs) {
@@ -185,6 +233,29 @@ TEST_F(CommandsTest, AWrongCommandLineIsToldWhatThereIs) {
               HasSubstr("\"fbx\" is none of csv, gltf, mdd, obj, pc2, usda, vtk"));
 }
 
+TEST_F(CommandsTest, ARefusalNamesWhatTheUserGave) {
+  service_.create(small_scene(), "drape");
+  ask({"step", "drape", "--frames", "10"});
+  const auto told = [&](const std::vector<std::string>& arguments) {
+    const Outcome outcome = weft(arguments);
+    EXPECT_EQ(outcome.exit, 1);
+    return outcome.err;
+  };
+  EXPECT_EQ(told({"watch", "drape", "--to", "3"}),
+            "weft: --to: 3 lies before the first frame, 10\n");
+  EXPECT_THAT(told({"record", "drape", "--from", "-1", "-o", path("a")}), HasSubstr(" --from: -1"));
+  EXPECT_THAT(told({"run", "drape", "--until-frame", "3"}), HasSubstr(" --until-frame: "));
+  EXPECT_THAT(told({"session", "snapshot", "drape", "--id", "A"}), HasSubstr(" --id: \"A\""));
+  EXPECT_THAT(told({"session", "get", "no name"}), HasSubstr(" SESSION: \"sessions/no name\""));
+  EXPECT_THAT(told({"act", "grab", "drape", "1,1", "--to", "1e9,0,0"}), HasSubstr(" --to: 1e+09"));
+  EXPECT_THAT(told({"act", "grab", "drape", "1,1", "--to", "0,0,0", "--over", "1e9"}),
+              HasSubstr(" --over: 1e+09"));
+  const auto error =
+      nlohmann::json::parse(told({"watch", "drape", "--to", "3", "--json"}))["error"];
+  EXPECT_EQ(error["violations"][0]["field"], "--to");
+  EXPECT_EQ(error["message"], "--to: 3 lies before the first frame, 10");
+}
+
 TEST_F(CommandsTest, AShellCompletesCommandsOptionsValuesAndSessions) {
   service_.create(small_scene(), "drape");
   setenv("WEFT_SERVER", address_.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
@@ -199,6 +270,8 @@ TEST_F(CommandsTest, AShellCompletesCommandsOptionsValuesAndSessions) {
   EXPECT_EQ(completed({"export", "a.weft", "--format", "p"}), "pc2\n");
   EXPECT_EQ(completed({"run", ""}), "drape\n");
   EXPECT_EQ(completed({"export", ""}), "") << "the shell names files";
+  EXPECT_EQ(completed({"help", "sc"}), "scene\nscenes\nscript\nscripting\n");
+  EXPECT_EQ(completed({"help", "scene", "n"}), "new\n");
   unsetenv("WEFT_SERVER");  // NOLINT(concurrency-mt-unsafe)
 }
 
@@ -291,7 +364,7 @@ TEST_F(CommandsTest, ATextileChangesOverTheTimeGiven) {
   const auto half = ask({"session", "get", "cloth"});
   EXPECT_DOUBLE_EQ(half["scene"]["sheets"][0]["textile"]["raw"]["stretch_n_per_m"], 300);
   const Outcome long_ = weft({"textile", "set", "cloth", "--set", "bend_n_m2=0", "--over", "1e5"});
-  EXPECT_THAT(long_.err, HasSubstr("duration_s: 1e+05 s is not within 0 to 10000 s"));
+  EXPECT_THAT(long_.err, HasSubstr("--over: 1e+05 s is not within 0 to 10000 s"));
 }
 
 TEST_F(CommandsTest, ABadTextileValueIsNamed) {

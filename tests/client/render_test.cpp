@@ -2,8 +2,11 @@
 #include <png.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <functional>
 
+#include "client/render/stage.h"
 #include "tests/client/client_test.h"
 
 namespace weft::testing {
@@ -75,6 +78,25 @@ v1::Scene standing_square() {
   rotation.set_x(1);
   sheet.mutable_pins(0)->clear_particles();
   for (int i = 0; i < 25; ++i) sheet.mutable_pins(0)->add_particles(i);
+  return scene;
+}
+
+// A sheet of a measured textile that only bends, its particles where `place` has those of a row and
+// a column.
+v1::Scene bent(const std::function<Eigen::Vector3d(int row, int column)>& place) {
+  v1::Scene scene = small_scene();
+  scene.mutable_environment()->mutable_gravity_m_per_s2();  // none
+  v1::Sheet& sheet = *scene.mutable_sheets(0);
+  sheet.clear_pins();
+  sheet.mutable_bending()->mutable_isometric()->set_resist_compression(false);
+  v1::MeasuredTextile& textile = *sheet.mutable_textile()->mutable_measured();
+  textile.set_areal_density_kg_per_m2(0.2);
+  textile.set_bend_rigidity_warp_n_m(3e-5);
+  textile.set_bend_rigidity_weft_n_m(5e-6);
+  for (int row = 0; row < sheet.grid().rows(); ++row) {
+    for (int column = 0; column < sheet.grid().columns(); ++column)
+      for (const double coordinate : place(row, column)) sheet.add_start_positions_m(coordinate);
+  }
   return scene;
 }
 
@@ -177,6 +199,54 @@ TEST_F(RenderTest, ColoursByStrainInOneScale) {
   EXPECT_GT(find_front(image, 80, 160).pixels, 75);
   const Rgb blue = image.at(40, 30);
   EXPECT_GT(blue.blue, blue.red + 60);
+}
+
+TEST_F(RenderTest, ASheetOnACylinderHasTheBendingEnergyOfItsCurvature) {
+  constexpr double kRadius = 0.25;
+  constexpr double kSpacing = 0.05;
+  const auto arc = [](int i) {
+    const double angle = 2 * i * std::asin(kSpacing / 2 / kRadius);
+    return Eigen::Vector2d(kRadius * std::cos(angle), kRadius * std::sin(angle));
+  };
+  const auto largest = [&](const v1::Scene& scene, const std::string& name) {
+    const auto answer = ask({"render", record(scene, name), "--frame", "0", "--colour", "bending",
+                             "--size", "64x64", "-o", png_});
+    return answer["largest_bending_energy_j_per_m2"].get<double>();
+  };
+  const v1::Scene along_warp = bent([&](int row, int column) {
+    return Eigen::Vector3d(arc(column).x(), arc(column).y(), kSpacing * row);
+  });
+  EXPECT_NEAR(largest(along_warp, "warp"), 3e-5 / 2 / (kRadius * kRadius), 1e-8);
+  v1::Scene along_weft = bent([&](int row, int column) {
+    return Eigen::Vector3d(arc(row).x(), arc(row).y(), kSpacing * column);
+  });
+  EXPECT_NEAR(largest(along_weft, "weft"), 5e-6 / 2 / (kRadius * kRadius), 1e-9);
+
+  // a raw textile has a rigidity too, by its spacing
+  *along_weft.mutable_sheets(0)->mutable_textile() = small_scene().sheets(0).textile();
+  EXPECT_NEAR(largest(along_weft, "raw"), 1.5 * 1e-5 / kSpacing / 2 / (kRadius * kRadius), 1e-7);
+}
+
+TEST_F(RenderTest, TheBendingEnergyOfAllParticlesIsWhatTheSolverHasOfIt) {
+  const v1::Scene scene = bent([](int row, int column) {
+    const double x = 0.05 * column;
+    const double z = 0.05 * row;
+    return Eigen::Vector3d(x, x * x * (z - 0.02) + std::sin(20 * z * x) / 50, z);
+  });
+  client::RecordingReader recording(record(scene, "saddle"));
+  const auto stage = read_stage(recording, 0, client::Colouring::kBending);
+  const std::vector<float>& values = stage.surfaces[0].values;
+  std::size_t pieces = 1;  // that a cell is drawn in
+  while ((3 * pieces + 1) * (4 * pieces + 1) < values.size()) ++pieces;
+  double energy = 0;
+  for (std::size_t row = 0; row < 4; ++row) {
+    for (std::size_t column = 0; column < 5; ++column) {
+      const double area = 0.05 * 0.05 * (row % 3 == 0 ? 0.5 : 1) * (column % 4 == 0 ? 0.5 : 1);
+      energy += area * values[pieces * (row * (4 * pieces + 1) + column)];
+    }
+  }
+  EXPECT_GT(energy, 1e-7);
+  EXPECT_NEAR(energy, recording.read(0).stats().potential_energy_j(), 1e-4 * energy);
 }
 
 TEST_F(RenderTest, ShowsSeveralFramesAndTheSameBytesAgain) {

@@ -177,6 +177,57 @@ steps:
   EXPECT_EQ(result["failed"], 0) << result;
 }
 
+TEST_F(ScriptTest, SessionsGoOnFromASnapshotAsOftenAsWanted) {
+  const auto result = ask({"script", script(R"(
+steps:
+  - create: {scene: scene.json}
+  - grab: {row: 3, column: 0}
+  - run: {until_frame: 10}
+  - snapshot: {snapshot: early}
+  - record: {file: cloth.weft}
+  - run: {until_frame: 15}
+  - restore: {session: same, snapshot: early}
+  - expect: {session: same, frame: 10}
+  - restore: {session: limp, snapshot: early}
+  - release: {session: limp, row: 3, column: 0}
+  - for: {session: [same, limp]}
+    steps:
+      - record: {session: $session, file: $session.weft}
+  - run: {session: [cloth, same, limp], until_frame: 30}
+)")});
+  EXPECT_EQ(result["failed"], 0) << result;
+  const auto against_cloth = [&](const std::string& file) {
+    return weft({"diff", path("cloth.weft"), path(file), "--within", "0"});
+  };
+  EXPECT_EQ(against_cloth("same.weft").exit, 0) << against_cloth("same.weft").err;
+  EXPECT_EQ(against_cloth("limp.weft").exit, 1);
+  EXPECT_EQ(ask({"info", path("same.weft")})["first_frame"], 10);
+  EXPECT_EQ(sessions(), 0);
+}
+
+TEST_F(ScriptTest, SnapshotsAreHeldToWhatAServerKeeps) {
+  const std::string told = refusal(R"(steps:
+  - create: {scene: scene.json}
+  - snapshot: {snapshot: a}
+  - snapshot: {snapshot: a}
+  - snapshot: {session: cloth}
+  - restore: {snapshot: a}
+  - restore: {session: cloth, snapshot: a}
+  - restore: {session: b, snapshot: z}
+  - restore: {session: c}
+)");
+  EXPECT_THAT(told,
+              AllOf(HasSubstr("line 4: snapshot.snapshot  there is a snapshot \"a\" already"),
+                    HasSubstr("line 5: snapshot           snapshot is missing"),
+                    HasSubstr("line 6: restore            session is missing"),
+                    HasSubstr("line 7: restore.session    there is a session \"cloth\" already"),
+                    HasSubstr("no snapshot \"z\" was taken before this"),
+                    HasSubstr("line 9: restore            snapshot is missing")));
+  std::string many = "steps:\n  - create: {scene: scene.json}\n";
+  for (int i = 0; i < 17; ++i) many += "  - snapshot: {snapshot: s" + std::to_string(i) + "}\n";
+  EXPECT_THAT(refusal(many), HasSubstr("line 19: snapshot: a session keeps at most 16 snapshots"));
+}
+
 TEST_F(ScriptTest, WhatIsNotAsExpectedFailsItsCaseAndIsAllTold) {
   const Outcome failed = weft({"script", "--junit", path("junit.xml"), script(R"(name: "a <test>"
 for: {low: [-1000, 1000]}

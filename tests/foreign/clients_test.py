@@ -243,6 +243,30 @@ class Weftd(unittest.TestCase):
         header, shown = self.weft.call("weft.v1.FrameService.ViewFrames", session=name, credits=1)
         self.assertEqual((header.header.start_frame, shown.frame.number), (9, 9))
 
+    def test_a_replay_is_read_as_the_session_that_it_was(self):
+        name = self.create("replayed").name
+        self.weft.call("weft.v1.SessionService.StepSession", name=name, frames=9)
+        read = lambda server: server.call(
+            "weft.v1.FrameService.StreamFrames", session=name, startFrame=0, endFrame=9)
+        frames = lambda messages: [each.frame for each in messages if each.HasField("frame")]
+        live = read(self.weft)
+        with tempfile.TemporaryDirectory() as directory:
+            file = pathlib.Path(directory) / "replayed.weft"
+            subprocess.check_output([BIN / "weft", "--server", self.address, "record", name,
+                                     "--from=0", "--to=9", "-o", file])
+            replay = subprocess.Popen([BIN / "weft", "replay", file, "--listen=127.0.0.1:0"],
+                                      stdout=subprocess.PIPE, text=True)
+            try:
+                channel = grpc.insecure_channel(replay.stdout.readline().split()[0])
+                replayed = read(Protos(self.weft.pool, channel))
+            finally:
+                replay.terminate()
+                replay.communicate(timeout=SECONDS)
+        self.assertEqual(replay.returncode, 0)
+        self.assertEqual(replayed[0].header, live[0].header)
+        self.assertEqual(len(frames(live)), 10)
+        self.assertEqual(frames(replayed), frames(live))
+
     def test_the_readme_s_reader_prints_every_frame(self):
         reader = pathlib.Path(__file__).parent / "read_frames.py"
         shown = reader.read_text().replace("\n", "\n    ").replace("\n    \n", "\n\n").rstrip()

@@ -177,6 +177,25 @@ test('sliders and typed numbers change the textile while it runs', async () => {
   await close();
 });
 
+test('colours of bending energy follow the textile, while the cloth stands too', async () => {
+  const {page, close} = await open('ball');
+  await page.locator('#colour').selectOption('bending');
+  await page.getByLabel('Scale to this frame').check();
+  await says(page, 'most', /^[\d.e-]+ J\/m²$/);
+  const most = async () => parseFloat(await page.textContent('#most'));
+  const before = await most();
+  for (const along of ['warp', 'weft']) {
+    const field = page.getByLabel(`Bending, ${along}, µN m`);
+    await field.fill(String(4 * Number(await field.inputValue())));
+    await page.keyboard.press('Enter');
+    await says(page, 'applied', new RegExp(`Bending, ${along} .* from frame`));
+  }
+  await settle(page);
+  assert.ok(Math.abs(await most() / before - 4) < 0.05, `${before}, ${await most()}`);
+  await picture(page, 'serve-bending');
+  await close();
+});
+
 test('what the server refuses is one sentence, and the slider goes back', async () => {
   const {page, close} = await open('ball');
   const before = await page.getByLabel('Friction, number').inputValue();

@@ -101,6 +101,20 @@ test('two recordings stand side by side in step, with what differs in bold', asy
   await close();
 });
 
+test('colours of bending energy mean what weft render says', async () => {
+  const {page, close} = await open('one.html');
+  await page.keyboard.press('End');
+  await page.locator('#colour').selectOption('bending');
+  await page.getByLabel('Scale to this frame').check();
+  await settle(page);
+  const [, shown] = (await page.textContent('#most')).match(/^([\d.e-]+) J\/m²$/);
+  const said = JSON.parse(weft('render', file('stiff.weft'), '--colour', 'bending', '--size', '64x64', '--json',
+    '-o', file('bending.png'))).largest_bending_energy_j_per_m2;
+  assert.ok(Math.abs(Number(shown) / said - 1) < 0.01, `${shown} J/m², ${said} J/m²`);
+  await picture(page, 'one-bending');
+  await close();
+});
+
 test('on a phone everything fits the width, and a finger turns the view', async () => {
   const {page, close} = await open('pair.html', {viewport: {width: 390, height: 844}, hasTouch: true, deviceScaleFactor: 2});
   await page.getByLabel('Simulated time').fill('30');

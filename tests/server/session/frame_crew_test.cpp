@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <chrono>
 #include <future>
 #include <memory>
@@ -19,13 +20,16 @@ using namespace std::chrono_literals;
 
 // With every thread of the scheduler in it.
 std::unique_ptr<FrameCrew> full_crew(Scheduler& scheduler, int hands) {
-  for (auto patience = 1ms;; patience *= 2) {  // its threads may be busy, or slow to come
+  for (auto patience = 1ms;; patience = std::min(2 * patience, 64ms)) {
+    // its threads may be busy, or slow to come
     auto crew = std::make_unique<FrameCrew>(scheduler, hands);
     const auto end = Clock::now() + patience;
     while (Clock::now() < end) {
       if (crew->hands() == hands) return crew;
       std::this_thread::yield();
     }
+    crew.reset();
+    std::this_thread::sleep_for(patience);  // while they leave it: no new one gets them before
   }
 }
 

@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "server/rpc/errors.h"
 
@@ -28,15 +29,22 @@ std::variant<Request, grpc::Status> named_request(const Caller& caller,
 std::variant<std::optional<std::string>, grpc::Status> Requests::find(
     const Request& request) const {
   std::lock_guard lock(mutex_);
-  const auto* known = uids_.find(request);
-  if (known == nullptr) return std::nullopt;
-  if (known->checksum != request.checksum) return errors::request_used();
-  return known->answer;
+  const auto found = known_.find(std::pmr::string(request.id));
+  if (request.id.empty() || found == known_.end()) return std::nullopt;
+  const Known& known = found->second;
+  if (known.checksum != request.checksum) return errors::request_used();
+  return std::string(known.uid);
 }
 
 void Requests::remember(const Request& request, const std::string& uid) {
   std::lock_guard lock(mutex_);
-  uids_.remember(request, uid);
+  if (request.id.empty()) return;
+  Known known{request.checksum, std::pmr::string(uid, &memory_)};
+  if (!known_.emplace(request.id, std::move(known)).second) return;
+  order_.emplace_back(request.id);
+  if (order_.size() <= kMost) return;
+  known_.erase(order_.front());
+  order_.pop_front();
 }
 
 }  // namespace weft

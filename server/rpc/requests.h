@@ -3,6 +3,10 @@
 #include <google/protobuf/message.h>
 #include <grpcpp/support/status.h>
 
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory_resource>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -29,8 +33,16 @@ class Requests {
   void remember(const Request& request, const std::string& uid);
 
  private:
-  mutable std::mutex mutex_;
-  Answers<std::string> uids_{kMost};
+  struct Known {
+    std::uint32_t checksum = 0;
+    std::pmr::string uid;
+  };
+
+  mutable std::mutex mutex_;  // guards all below
+  // They lie beside each other: scattered, they would keep the memory of sessions that are gone.
+  std::pmr::unsynchronized_pool_resource memory_;
+  std::pmr::map<std::pmr::string, Known> known_{&memory_};
+  std::pmr::deque<std::pmr::string> order_{&memory_};  // oldest first
 };
 
 }  // namespace weft

@@ -414,8 +414,8 @@ grpc::ServerUnaryReactor* SessionService::RunSession(grpc::CallbackServerContext
     if (request->has_time_scale()) {
       const double scale = request->time_scale();
       if (!(scale >= 1e-3 && scale <= 1000)) {  // NaN too
-        return call.Finish(errors::field_invalid(
-            "time_scale", std::to_string(scale) + " is not within 0.001 to 1000"));
+        return call.Finish(
+            errors::field_invalid("time_scale", join(scale, " is not within 0.001 to 1000")));
       }
       command.time_scale = scale;
     }

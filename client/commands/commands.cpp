@@ -5,12 +5,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "client/output/text.h"
 #include "server/config.h"
 
 namespace weft::client {
 namespace {
+
+// Processor time of a second of simulated time, where the server has computed something to go by.
+std::optional<double> seconds_of(const v1::Plan& plan, const v1::ServerStats& stats) {
+  constexpr double kEnough = 0.1;  // s
+  if (stats.frame_time_s().sum() < kEnough || stats.particle_substeps() == 0) return std::nullopt;
+  return plan.particle_substeps_per_second() * stats.frame_time_s().sum() /
+         static_cast<double>(stats.particle_substeps());
+}
 
 std::string sheets_text(const v1::Scene& scene) {
   std::string text;
@@ -83,8 +92,8 @@ std::pair<std::string, std::uint16_t> read_address(const char* option, const std
   return {host, static_cast<std::uint16_t>(std::stoi(port))};
 }
 
-std::string state_text(v1::SessionState state) {
-  switch (state) {
+std::string state_text(const v1::Session& session) {
+  switch (session.state()) {
     case v1::SESSION_STATE_PAUSED:
       return "paused";
     case v1::SESSION_STATE_RUNNING:
@@ -93,16 +102,23 @@ std::string state_text(v1::SessionState state) {
       return "restoring";
     case v1::SESSION_STATE_FAILED:
       return "failed";
+    case v1::SESSION_STATE_STORED:
+      return "stored";
     default:
-      return "unknown";
+      return session.replica().empty() ? "unknown" : "on " + session.replica();
   }
+}
+
+bool is_shown(const v1::Session& session) {
+  return session.state() != v1::SESSION_STATE_UNSPECIFIED &&
+         session.state() != v1::SESSION_STATE_STORED;
 }
 
 std::string session_text(const v1::Session& session) {
   Facts facts;
   facts.add("session", session.name())
       .add("uid", session.uid())
-      .add("state", state_text(session.state()))
+      .add("state", state_text(session))
       .add("frame", std::to_string(session.frame()))
       .add("simulated time", seconds_text(session.time_s()))
       .add("at rest", session.at_rest() ? "yes" : "no")
@@ -114,6 +130,7 @@ std::string session_text(const v1::Session& session) {
                                     seconds_text(repair.substep_s()), repair.reason()));
   }
   if (!session.owner().empty()) facts.add("owner", session.owner());
+  if (!session.replica().empty()) facts.add("replica", session.replica());
   if (!session.failure().empty()) facts.add("failure", session.failure());
   return facts.text();
 }
@@ -129,7 +146,7 @@ v1::ListSessionsResponse list_sessions(Connection& connection) {
   return all;
 }
 
-std::string plan_text(const v1::Plan& plan) {
+std::string plan_text(const v1::Plan& plan, const v1::ServerStats* stats) {
   const double frame_step = plan.substep_s() * static_cast<double>(plan.substeps_per_frame());
   Facts facts;
   facts.add("frame step", fmt::format("{} = {} of {}", seconds_text(frame_step),
@@ -147,6 +164,10 @@ std::string plan_text(const v1::Plan& plan) {
            number_text(plan.damping_ratio()) + " of the stiffest mode, 1 is critical");
   facts.add("cost", fmt::format("{:.3g} million particle-substeps for a second",
                                 plan.particle_substeps_per_second() / 1e6));
+  if (const auto time = stats != nullptr ? seconds_of(plan, *stats) : std::nullopt) {
+    facts.add("cost", fmt::format("{} of a core, at the pace of this server's sessions",
+                                  seconds_text(*time)));
+  }
   for (const auto& cost : plan.stretch_costs()) {
     if (!std::isfinite(cost.self_weight_strain())) continue;
     facts.add("stretch", fmt::format("{}: {} under its own weight, hung by an edge", cost.sheet(),

@@ -90,10 +90,13 @@ std::pair<std::string, std::uint16_t> read_address(const char* option, const std
 // All of them, from as many pages as it takes.
 v1::ListSessionsResponse list_sessions(Connection& connection);
 
-// "paused"
-std::string state_text(v1::SessionState state);
+// "paused", or "on weftd-2" where another server has it and may say more.
+std::string state_text(const v1::Session& session);
+// Whether it is known where it stands.
+bool is_shown(const v1::Session& session);
 // What a session is and does, and what the solver does for it, for people.
 std::string session_text(const v1::Session& session);
-std::string plan_text(const v1::Plan& plan);
+// Where there are a server's counts, the cost in its time too.
+std::string plan_text(const v1::Plan& plan, const v1::ServerStats* stats = nullptr);
 
 }  // namespace weft::client

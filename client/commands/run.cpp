@@ -58,7 +58,7 @@ void run_freely(Context& context, const RunOptions& options) {
                   {"frame", session.frame()},
                   {"time_s", session.time_s()},
                   {"at_rest", session.at_rest()}},
-                 fmt::format("{} at frame {}, {}{}\n", state_text(session.state()), session.frame(),
+                 fmt::format("{} at frame {}, {}{}\n", state_text(session), session.frame(),
                              seconds_text(session.time_s()), session.at_rest() ? ", at rest" : ""));
 }
 

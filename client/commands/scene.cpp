@@ -39,7 +39,9 @@ void run_check(Context& context, const std::string& path) {
   const std::string heading = fmt::format(
       "{}: {}, {}, {}\n", path, count_of(session.scene().sheets_size(), "sheet"),
       count_of(particles, "particle"), count_of(session.scene().colliders_size(), "collider"));
-  context.answer(to_json(session.plan()), heading + plan_text(session.plan()));
+  const auto stats = context.connection().call(&v1::ServerService::Stub::GetServerStats,
+                                               v1::GetServerStatsRequest());
+  context.answer(to_json(session.plan()), heading + plan_text(session.plan(), &stats));
 }
 
 std::string template_list() {

@@ -27,8 +27,9 @@ void run_list(Context& context) {
   const v1::ListSessionsResponse all = list_sessions(context.connection());
   Table table({"SESSION", "STATE", "FRAME", "TIME", "AT REST", "SHEETS"});
   for (const auto& session : all.sessions()) {
-    table.add({session.name(), state_text(session.state()), std::to_string(session.frame()),
-               seconds_text(session.time_s()), session.at_rest() ? "yes" : "no",
+    const auto known = [&](const std::string& text) { return is_shown(session) ? text : "-"; };
+    table.add({session.name(), state_text(session), known(std::to_string(session.frame())),
+               known(seconds_text(session.time_s())), known(session.at_rest() ? "yes" : "no"),
                std::to_string(session.scene().sheets_size())});
   }
   context.answer(to_json(all), all.sessions().empty() ? "no sessions\n" : table.text());

@@ -85,6 +85,7 @@ std::string sessions_text(const Look& now, const Look& before) {
   for (const auto& session : before.sessions.sessions()) times[session.uid()] = session.time_s();
   std::vector<std::pair<double, const v1::Session*>> rows;
   for (const auto& session : now.sessions.sessions()) {
+    if (!is_shown(session)) continue;
     const auto known = times.find(session.uid());
     const double speed = known == times.end() ? 0 : (session.time_s() - known->second) / seconds;
     rows.emplace_back(speed, &session);
@@ -96,7 +97,7 @@ std::string sessions_text(const Look& now, const Look& before) {
   const std::size_t shown = std::min(rows.size(), kMostRows);
   for (std::size_t i = 0; i < shown; ++i) {
     const auto& [speed, session] = rows[i];
-    table.add({session->name(), state_text(session->state()), std::to_string(session->frame()),
+    table.add({session->name(), state_text(*session), std::to_string(session->frame()),
                seconds_text(session->time_s()), fmt::format("{:.2f} x", speed),
                seconds_text(session->lateness_s()), session->at_rest() ? "yes" : "no"});
   }

@@ -7,6 +7,7 @@
 #include "client/connection.h"
 #include "client/weft.h"
 #include "server/config.h"
+#include "client/templates/templates.h"
 #include "tests/client/client_test.h"
 
 namespace weft::testing {
@@ -68,6 +69,35 @@ TEST_F(CommandsTest, ASceneGoesFromTemplateThroughSessionAndRecordingToAnExport)
   ask({"session", "delete", "again"});
   EXPECT_EQ(ask({"session", "delete", "drape"})["deleted"], "sessions/drape");
   EXPECT_TRUE(ask({"session", "list"})["sessions"].empty());
+}
+
+TEST(SessionList, SaysWhereASessionIsThatTheServerHasNot) {
+  const TemporaryDirectory directory;
+  ServerOptions options;
+  options.data_dir = directory.name();
+  options.idle = std::chrono::milliseconds(50);
+  Service service(options);
+  service.step(service.create(small_scene(), "curtain"), 3);
+  while (service.info().sessions() > 0) std::this_thread::yield();
+  const Outcome listed = run_weft({"--server", service.server.address(), "session", "list"});
+  EXPECT_THAT(listed.out, HasSubstr("sessions/curtain  stored  -  "));
+  const Outcome shown =
+      run_weft({"--server", service.server.address(), "session", "get", "curtain"});
+  EXPECT_EQ(shown.exit, 0) << shown.err;
+}
+
+TEST_F(CommandsTest, ASceneIsPricedByThePaceOfTheServersSessions) {
+  const std::string scene = scene_file(small_scene());
+  EXPECT_THAT(weft({"scene", "explain", scene}).out, Not(HasSubstr("of a core")));
+  const auto session = service_.create(client::make_template("load", {}));  // never asleep
+  v1::ServerStats stats;
+  do {
+    service_.step(session, 100);
+    grpc::ClientContext another;
+    ASSERT_TRUE(service_.servers->GetServerStats(&another, {}, &stats).ok());
+  } while (stats.frame_time_s().sum() < 0.1);
+  EXPECT_THAT(weft({"scene", "explain", scene}).out,
+              HasSubstr("of a core, at the pace of this server's sessions"));
 }
 
 TEST_F(CommandsTest, ASceneFileIsRefusedWithEveryBadFieldAndItsPlaceInTheFile) {

@@ -5,9 +5,9 @@
 #include <thread>
 
 #include "client/connection.h"
+#include "client/templates/templates.h"
 #include "client/weft.h"
 #include "server/config.h"
-#include "client/templates/templates.h"
 #include "tests/client/client_test.h"
 
 namespace weft::testing {

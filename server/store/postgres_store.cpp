@@ -1,9 +1,8 @@
 #include <spdlog/spdlog.h>
 
-#include <condition_variable>
+#include <algorithm>
 #include <deque>
-#include <exception>
-#include <future>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <mutex>
@@ -17,6 +16,7 @@
 #include "server/store/records.h"
 #include "server/store/snapshots.h"
 #include "server/store/store.h"
+#include "server/store/write_queue.h"
 
 namespace weft {
 namespace {
@@ -156,7 +156,7 @@ class PostgresStore final : public SessionStore {
         calls_(url),
         lease_(url),
         snapshots_(std::make_unique<SnapshotTable>(url, tenures_)) {}
-  ~PostgresStore() override;
+  ~PostgresStore() override { stop(); }
 
   LeftBehind load() override;
   void add(const KeptSession& session, const Request& creation,
@@ -175,7 +175,7 @@ class PostgresStore final : public SessionStore {
   bool is_shared() const override { return true; }
   bool has_others() const override { return true; }
   Claim claim(const std::string& id) override;
-  bool let_go(const SessionIdentity& identity) override;
+  void let_go(const SessionIdentity& identity) override;
   std::vector<ListedSession> list(const std::string& after, std::size_t count,
                                   const std::optional<std::string>& owner) override;
   std::optional<CarriedOut> find_request(const std::string& id) override;
@@ -195,46 +195,34 @@ class PostgresStore final : public SessionStore {
   static void keep_request(pqxx::work& transaction, const Request& request, const std::string& uid);
   static LeftSession read_session(pqxx::work& transaction, const std::string& uid,
                                   const std::string& id, const records::Row& progress);
-  void post(const std::string& uid, Work work, SessionLog::Written written);
-  void work();
+  void post(const std::string& uid, Work work, SessionLog::Written written) {
+    writes_.post({uid, std::move(work), std::move(written)});
+  }
   void commit(std::deque<Job> jobs);
   void finish(const Job& job, const std::string& error, bool own);
   void lose(const std::string& uid);
-  bool pause(milliseconds time);
 
   bool renew();
   void look_for_losses();
   void look_for_orphans();
+  void clear_up();
   void keep_lease();
+  void stop();
 
   const std::string replica_;
   std::int64_t number_ = 0;  // of this process among all replicas
   Tenures tenures_;
   PostgresConnection log_, calls_, lease_;
-  Snapshots snapshots_;
-
-  std::mutex mutex_;  // guards all below
-  std::condition_variable changed_;
-  std::deque<Job> jobs_;
-  bool stopping_ = false;
-  Watch watch_;
-  std::thread writer_, keeper_;
+  std::mutex mutex_;
+  Watch watch_;  // guarded by mutex_
+  WriteQueue<Job> writes_{[this](std::deque<Job> jobs) { commit(std::move(jobs)); }};
+  std::thread keeper_;
+  Snapshots snapshots_;  // whose thread posts writes
 };
 
-PostgresStore::~PostgresStore() {
-  {
-    std::lock_guard lock(mutex_);
-    stopping_ = true;
-    changed_.notify_all();
-  }
-  if (writer_.joinable()) writer_.join();
+void PostgresStore::stop() {
+  writes_.stop();
   if (keeper_.joinable()) keeper_.join();
-}
-
-// False where the store is to stop.
-bool PostgresStore::pause(milliseconds time) {
-  std::unique_lock lock(mutex_);
-  return !changed_.wait_for(lock, time, [&] { return stopping_; });
 }
 
 LeftBehind PostgresStore::load() {
@@ -255,7 +243,7 @@ LeftBehind PostgresStore::load() {
     number_ = number_of(transaction.exec1("SELECT nextval('weft.replica_number')")[0]);
   });
   renew();
-  writer_ = std::thread([this] { work(); });
+  clear_up();
   return {};
 }
 
@@ -386,24 +374,6 @@ std::unique_ptr<SessionLog> PostgresStore::log_of(const std::string& uid, std::i
   return std::make_unique<Log>(*this, uid, entries);
 }
 
-void PostgresStore::post(const std::string& uid, Work work, SessionLog::Written written) {
-  std::lock_guard lock(mutex_);
-  jobs_.push_back({uid, std::move(work), std::move(written)});
-  changed_.notify_all();
-}
-
-void PostgresStore::work() {
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
-    if (jobs_.empty()) return;
-    auto jobs = std::exchange(jobs_, {});
-    lock.unlock();
-    commit(std::move(jobs));
-    lock.lock();
-  }
-}
-
 // While the database is away its work waits: what became of the last of it is not known, and all of
 // it may be done again.
 void PostgresStore::commit(std::deque<Job> jobs) {
@@ -417,7 +387,7 @@ void PostgresStore::commit(std::deque<Job> jobs) {
       return;
     } catch (const StoreLost& error) {
       if (time == kFirstPause) spdlog::warn("{}; changes wait", error.what());
-      if (pause(time)) continue;
+      if (writes_.pause(time)) continue;
       for (const Job& job : jobs) finish(job, error.what(), true);
       return;
     } catch (const StoreError& error) {
@@ -494,7 +464,7 @@ Claim PostgresStore::claim(const std::string& id) {
   return claim;
 }
 
-bool PostgresStore::let_go(const SessionIdentity& identity) {
+void PostgresStore::let_go(const SessionIdentity& identity) {
   const std::string& uid = identity.uid;
   const Tenure tenure = tenures_.of(uid);
   calls_.run([&](pqxx::work& transaction) {
@@ -503,7 +473,6 @@ bool PostgresStore::let_go(const SessionIdentity& identity) {
         tenure.owner, tenure.epoch);
   });
   tenures_.erase(uid);
-  return true;
 }
 
 std::vector<ListedSession> PostgresStore::list(const std::string& after, std::size_t count,
@@ -518,9 +487,8 @@ std::vector<ListedSession> PostgresStore::list(const std::string& after, std::si
              "WHERE s.id COLLATE \"C\" > $1 AND ($2 OR s.principal = $3) "
              "ORDER BY s.id COLLATE \"C\" LIMIT $4",
              after, !owner, owner.value_or(""), static_cast<std::int64_t>(count))) {
-      const std::string record = bytes_of(row[0]);
-      if (checksum(row[2].as<std::string>(), record) != number_of(row[1])) continue;
-      sessions.push_back({records::decode_session(record), row[3].as<std::string>()});
+      auto session = records::kept(row[2].as<std::string>(), {bytes_of(row[0]), number_of(row[1])});
+      if (session) sessions.push_back({*std::move(session), row[3].as<std::string>()});
     }
   });
   return sessions;
@@ -590,21 +558,29 @@ void PostgresStore::look_for_orphans() {
              "WHERE r.number <> $1 AND NOT weft.holds(r.number, $1) ORDER BY random() LIMIT $2",
              number_, kOrphans))
       ids.push_back(row[0].as<std::string>());
+  });
+  for (const std::string& id : ids) watch_.orphaned(id);
+}
+
+// What nobody needs any more.
+void PostgresStore::clear_up() {
+  lease_.run([&](pqxx::work& transaction) {
     transaction.exec(
         "DELETE FROM weft.replica r WHERE lease_until < now() - INTERVAL '1 hour' "
         "AND NOT EXISTS (SELECT FROM weft.session WHERE owner = r.number)");
     transaction.exec("DELETE FROM weft.request WHERE carried_out < now() - INTERVAL '24 hours'");
   });
-  for (const std::string& id : ids) watch_.orphaned(id);
 }
 
 void PostgresStore::keep_lease() {
+  constexpr int kClearUp = 1000;  // renewals
   bool reached = true, gap = false;
-  while (pause(kRenewal)) try {
+  for (int turn = 1; writes_.pause(kRenewal); ++turn) try {
       gap = renew() || gap;
       if (gap) look_for_losses();
       gap = false;
       look_for_orphans();
+      if (turn % kClearUp == 0) clear_up();
       if (!std::exchange(reached, true)) spdlog::info("{} is back", lease_.place());
     } catch (const StoreError& error) {
       if (std::exchange(reached, false)) spdlog::warn("{}", error.what());
@@ -612,13 +588,7 @@ void PostgresStore::keep_lease() {
 }
 
 void PostgresStore::leave() {
-  {
-    std::lock_guard lock(mutex_);
-    stopping_ = true;
-    changed_.notify_all();
-  }
-  if (keeper_.joinable()) keeper_.join();
-  if (writer_.joinable()) writer_.join();
+  stop();
   try {
     lease_.run([&](pqxx::work& transaction) {
       transaction.exec_params(

@@ -164,6 +164,13 @@ std::string entry_key(const std::string& uid, std::int64_t number) {
   return uid + "/" + std::to_string(number);
 }
 
+std::optional<KeptSession> kept(const std::string& uid, const Row& session) try {
+  if (session.checksum != checksum(uid, session.record)) return std::nullopt;
+  return decode_session(session.record);
+} catch (const StoreError&) {
+  return std::nullopt;
+}
+
 std::optional<std::string> owner_of(const std::string& uid, const Row& session) {
   stored::KeptSession kept;
   const bool sound =

@@ -43,7 +43,10 @@ struct NumberedRow : Row {
 LeftSession assemble(const std::string& uid, const std::string& id, const Row& session,
                      const Row& progress, const std::vector<NumberedRow>& entries);
 
-// Its principal, where the row can be trusted.
+// A session as it was created, where the row can be trusted.
+std::optional<KeptSession> kept(const std::string& uid, const Row& session);
+
+// Its principal, where so much can be trusted.
 std::optional<std::string> owner_of(const std::string& uid, const Row& session);
 
 // What the checksum of an entry covers beside the record.

@@ -4,19 +4,18 @@
 #include <spdlog/spdlog.h>
 #include <sqlite3.h>
 
-#include <condition_variable>
 #include <deque>
 #include <filesystem>
 #include <future>
 #include <map>
 #include <mutex>
 #include <set>
-#include <thread>
 #include <utility>
 
 #include "server/store/records.h"
 #include "server/store/snapshot_files.h"
 #include "server/store/snapshots.h"
+#include "server/store/write_queue.h"
 
 namespace weft {
 namespace {
@@ -85,20 +84,12 @@ std::string blob(SQLite::Column column) {
   return {static_cast<const char*>(column.getBlob()), static_cast<std::size_t>(column.getBytes())};
 }
 
-// One connection and one thread that writes; what comes while it commits is committed together.
+// One connection, and one thread that writes.
 class SqliteStore final : public SessionStore {
  public:
   explicit SqliteStore(const std::string& directory)
-      : path_(make_path(directory)), database_(open(path_)), thread_([this] { work(); }) {}
-
-  ~SqliteStore() override {
-    {
-      std::lock_guard lock(mutex_);
-      stopping_ = true;
-      changed_.notify_all();
-    }
-    thread_.join();
-  }
+      : path_(make_path(directory)), database_(open(path_)) {}
+  ~SqliteStore() override { writes_.stop(); }
 
   LeftBehind load() override;
   std::optional<SessionSnapshot> snapshot(const std::string& uid,
@@ -116,7 +107,7 @@ class SqliteStore final : public SessionStore {
 
   bool has_others() const override;
   Claim claim(const std::string& id) override;
-  bool let_go(const SessionIdentity& identity) override;
+  void let_go(const SessionIdentity& identity) override;
   std::vector<ListedSession> list(const std::string& after, std::size_t count,
                                   const std::optional<std::string>& owner) override;
 
@@ -133,28 +124,24 @@ class SqliteStore final : public SessionStore {
                            const std::string& uid);
   LeftSession load_session(const std::string& uid, const std::string& id,
                            const records::Row& session);
-  void post(Work work, SessionLog::Written written);
+  void post(Work work, SessionLog::Written written) {
+    writes_.post({std::move(work), std::move(written)});
+  }
   void carry_out(Work work);
-  void work();
   std::string commit(const std::deque<Job>& jobs);
 
   const std::string path_;
   SQLite::Database database_;  // used by load(), then by the thread alone
-  mutable std::mutex mutex_;   // guards all below but the thread
-  std::condition_variable changed_;
-  std::deque<Job> jobs_;
-  bool stopping_ = false;
-  std::map<std::string, SessionIdentity> let_go_;  // sessions that the server has not, by id
-  std::thread thread_;
-  std::unique_ptr<SnapshotFiles> make_shelf() {
-    const auto directory = std::filesystem::path(path_).replace_filename("snapshots");
-    auto shelf = std::make_unique<SnapshotFiles>(directory);
-    snapshot_files_ = shelf.get();
-    return shelf;
-  }
-
-  const SnapshotFiles* snapshot_files_ = nullptr;
-  Snapshots snapshots_{make_shelf()};
+  mutable std::mutex mutex_;
+  // Sessions that the server has not, by id; guarded by mutex_.
+  std::map<std::string, SessionIdentity> let_go_;
+  WriteQueue<Job> writes_{[this](const std::deque<Job>& jobs) {
+    const std::string error = commit(jobs);
+    for (const Job& job : jobs) job.written(error);
+  }};
+  const std::filesystem::path snapshot_directory_ =
+      std::filesystem::path(path_).replace_filename("snapshots");
+  Snapshots snapshots_{std::make_unique<SnapshotFiles>(snapshot_directory_)};
 };
 
 SQLite::Database SqliteStore::open(const std::string& path) try {
@@ -207,7 +194,7 @@ LeftBehind SqliteStore::load() try {
     }
     uids.insert(uid);
   }
-  snapshot_files_->keep_only(uids);
+  SnapshotFiles(snapshot_directory_).keep_only(uids);
   return left;
 } catch (const SQLite::Exception& error) {
   throw StoreError(text_of(path_, error));
@@ -377,9 +364,9 @@ bool SqliteStore::has_others() const {
   return !let_go_.empty();
 }
 
-bool SqliteStore::let_go(const SessionIdentity& identity) {
+void SqliteStore::let_go(const SessionIdentity& identity) {
   std::lock_guard lock(mutex_);
-  return let_go_.emplace(identity.id, identity).second;
+  let_go_.emplace(identity.id, identity);
 }
 
 Claim SqliteStore::claim(const std::string& id) {
@@ -416,10 +403,10 @@ std::vector<ListedSession> SqliteStore::list(const std::string& after, std::size
                           "SELECT uid, record, checksum FROM session WHERE id > ? ORDER BY id");
     row.bind(1, after);
     while (sessions.size() < count && row.executeStep()) {
-      const std::string record = blob(row.getColumn(1));
-      if (checksum(row.getColumn(0).getString(), record) != row.getColumn(2).getInt64()) continue;
-      KeptSession session = records::decode_session(record);
-      if (!owner || session.identity.owner == *owner) sessions.push_back({std::move(session), ""});
+      auto session = records::kept(row.getColumn(0).getString(),
+                                   {blob(row.getColumn(1)), row.getColumn(2).getInt64()});
+      if (session && (!owner || session->identity.owner == *owner))
+        sessions.push_back({*std::move(session), ""});
     }
   });
   return sessions;
@@ -431,25 +418,6 @@ void SqliteStore::carry_out(Work work) {
   post(std::move(work), [&](const std::string& error) { done.set_value(error); });
   const std::string error = done.get_future().get();
   if (!error.empty()) throw StoreError(error);
-}
-
-void SqliteStore::post(Work work, SessionLog::Written written) {
-  std::lock_guard lock(mutex_);
-  jobs_.push_back({std::move(work), std::move(written)});
-  changed_.notify_one();
-}
-
-void SqliteStore::work() {
-  std::unique_lock lock(mutex_);
-  for (;;) {
-    changed_.wait(lock, [&] { return stopping_ || !jobs_.empty(); });
-    if (jobs_.empty()) return;
-    const auto jobs = std::exchange(jobs_, {});
-    lock.unlock();
-    const std::string error = commit(jobs);
-    for (const auto& job : jobs) job.written(error);
-    lock.lock();
-  }
 }
 
 // What kept all of them from being written, if anything.

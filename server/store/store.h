@@ -119,8 +119,8 @@ class SessionStore {
   // Such a session, by its id; taken over where no living server has it.
   virtual Claim claim(const std::string& /*id*/) { return {}; }
 
-  // Makes one such of a session that nothing is written of any more. False where that cannot be.
-  virtual bool let_go(const SessionIdentity& /*identity*/) { return false; }
+  // Makes one such of a session that nothing is written of any more.
+  virtual void let_go(const SessionIdentity& /*identity*/) {}
 
   // In order of id, at most `count` of those after `after`; of one owner, or of all.
   virtual std::vector<ListedSession> list(const std::string& /*after*/, std::size_t /*count*/,

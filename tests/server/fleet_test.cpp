@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "server/store/records.h"
 #include "server/store/store.h"
 #include "tests/support/service/postgres.h"
 #include "tests/support/service/process.h"
@@ -199,6 +200,18 @@ TEST_F(Fleet, ListsTheSessionsOfAllServersPageByPage) {
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty());
   EXPECT_THAT(found, ElementsAre("five@a", "four@b", "one@a", "three@a", "two@b"));
+}
+
+TEST_F(Fleet, ListsTheOthersWhereASceneIsNoneThatThisVersionKnows) {
+  const auto a = server("a"), b = server("b");
+  a->create(small_scene(), "curtain");
+  const std::string uid = a->create(small_scene(), "puzzle").uid(), record = "\x01";
+  change("UPDATE weft.scene SET record = '\\x01', checksum = " +
+         std::to_string(records::checksum(uid, record)) + " WHERE uid = '" + uid + "'");
+  v1::ListSessionsResponse listed;
+  ASSERT_TRUE(b->call(&Sessions::ListSessions, {}, &listed).ok());
+  ASSERT_THAT(listed.sessions(), SizeIs(1));
+  EXPECT_EQ(listed.sessions(0).name(), "sessions/curtain");
 }
 
 TEST_F(Fleet, HasOneSessionOfAName) {

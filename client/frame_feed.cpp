@@ -49,8 +49,8 @@ void FrameFeed::open() {
   reader_ = connection_.frames().StreamFrames(context_.get(), request_);
 }
 
-// Notes what is wanted next; false for a message the caller has had.
-bool FrameFeed::note(const v1::StreamFramesResponse& message) {
+// Notes what is wanted next; false for a message that the caller has had, or that is a part.
+bool FrameFeed::note(v1::StreamFramesResponse& message) {
   attempts_.note_message();
   if (message.has_header()) {
     const std::string& numerics = message.header().numerics_id();
@@ -60,7 +60,7 @@ bool FrameFeed::note(const v1::StreamFramesResponse& message) {
                                 "continue those before to the bit",
                                 header_->numerics_id(), numerics));
     }
-    particle_count(message.header());  // throws
+    parts_.begin(message.header());
     request_.set_uid(message.header().uid());
     if (!request_.has_start_frame()) request_.set_start_frame(message.header().start_frame());
     return !std::exchange(header_, message.header());
@@ -70,6 +70,7 @@ bool FrameFeed::note(const v1::StreamFramesResponse& message) {
                   "the server sent something else before the header");
   }
   if (message.has_frame()) {
+    if (!parts_.join(*message.mutable_frame())) return false;
     if (!is_whole(message.frame(), *header_)) {
       throw Problem(Exit::kRefused, "INTERNAL", "FRAME_INCOMPLETE",
                     fmt::format("the server sent frame {}, but not as long as its header says",

@@ -7,6 +7,7 @@
 #include <stop_token>
 
 #include "client/connection.h"
+#include "client/frame_parts.h"
 
 namespace weft::client {
 
@@ -32,13 +33,14 @@ class FrameFeed {
 
  private:
   void open();
-  bool note(const v1::StreamFramesResponse& message);
+  bool note(v1::StreamFramesResponse& message);
 
   Connection& connection_;
   v1::StreamFramesRequest request_;
   std::stop_token stop_;
   Attempts attempts_;
   std::optional<v1::StreamHeader> header_;  // the latest
+  FrameParts parts_;
   int reconnections_ = 0;
 
   std::unique_ptr<grpc::ClientContext> context_;

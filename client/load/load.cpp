@@ -13,6 +13,7 @@
 #include <tuple>
 #include <vector>
 
+#include "client/frame_parts.h"
 #include "client/problem.h"
 
 namespace weft::client {
@@ -124,14 +125,18 @@ class Load {
     }
     void cancel() { context_.TryCancel(); }
 
-    void OnReadDone(bool ok) override {
+    void OnReadDone(bool ok) override try {
       if (!ok) return;
       if (message_.has_frame()) {
-        load_.receive(session_, *this, message_.frame(), Clock::now());
+        if (parts_.join(*message_.mutable_frame()))
+          load_.receive(session_, *this, message_.frame(), Clock::now());
       } else if (message_.has_header()) {
+        parts_.begin(message_.header());
         note_opening();
       }
       StartRead(&message_);
+    } catch (const Problem&) {  // no frame of this stream
+      cancel();
     }
 
     void OnDone(const grpc::Status& status) override {
@@ -156,6 +161,7 @@ class Load {
     grpc::ClientContext context_;
     v1::StreamFramesRequest request_;
     v1::StreamFramesResponse message_;
+    FrameParts parts_;
   };
 
   // A call to be sent: the creation of a session, or a step of it.

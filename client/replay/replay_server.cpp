@@ -8,6 +8,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <utility>
 #include <variant>
 
 #include "client/problem.h"
@@ -224,11 +225,7 @@ class FrameReplay final : public v1::FrameService::Service {
     while (!request->has_end_frame() || next <= request->end_frame()) {
       const auto place = writing.await(next);
       if (const auto* error = std::get_if<Status>(&place)) return *error;
-      v1::StreamFramesResponse message;
-      if (Status status = fill(*message.mutable_frame(), next, request->format()); !status.ok())
-        return status;
-      writing.write(message);
-      ++next;
+      if (Status status = writing.write_frame(next++, 0); !status.ok()) return status;
     }
     return Status::OK;
   }
@@ -254,11 +251,7 @@ class FrameReplay final : public v1::FrameService::Service {
         const auto place = writing.await(next);
         if (const auto* error = std::get_if<Status>(&place)) return *error;
         const std::int64_t newest = std::get<Player::Place>(place).newest->number;
-        v1::ViewFramesResponse message;
-        if (Status status = fill(*message.mutable_frame(), newest, first.format()); !status.ok())
-          return status;
-        message.set_skipped_count(newest - next);
-        writing.write(message);
+        if (Status status = writing.write_frame(newest, newest - next); !status.ok()) return status;
         next = newest + 1;
       }
     } while (stream->Read(&request));
@@ -272,7 +265,12 @@ class FrameReplay final : public v1::FrameService::Service {
    public:
     Writing(FrameReplay& frames, ServerContext& context, Writer writer,
             const v1::StreamHeader& header)
-        : frames_(frames), context_(context), writer_(writer) {
+        : frames_(frames),
+          context_(context),
+          writer_(writer),
+          order_{.format = header.format(), .most_bytes = Limits().max_frame_bytes} {
+      for (const auto& sheet : header.sheets())
+        order_.sheets.push_back({.rows = sheet.rows(), .columns = sheet.columns()});
       Response message;
       *message.mutable_header() = header;
       write(message);
@@ -299,6 +297,19 @@ class FrameReplay final : public v1::FrameService::Service {
       }
     }
 
+    Status write_frame(std::int64_t number, std::int64_t skipped) try {
+      for (v1::Frame& part : to_proto(*frames_.player_.frame(number), order_)) {
+        Response message;
+        *message.mutable_frame() = std::move(part);
+        if constexpr (requires { message.set_skipped_count(skipped); })
+          message.set_skipped_count(skipped);
+        write(message);
+      }
+      return Status::OK;
+    } catch (const Problem& problem) {
+      return errors::solver_failed(problem.what(), number - 1);
+    }
+
     void write(const Response& message) {
       writer_.Write(message);
       last_write_ = Clock::now();
@@ -310,6 +321,7 @@ class FrameReplay final : public v1::FrameService::Service {
     FrameReplay& frames_;
     ServerContext& context_;
     Writer writer_;
+    FrameOrder order_;
     std::uint64_t changes_ = 0;
     Clock::time_point last_write_;
   };
@@ -324,8 +336,7 @@ class FrameReplay final : public v1::FrameService::Service {
     }
     const auto newest = player_.place().newest;
     auto problems =
-        find_problems(request.format(), static_cast<std::int64_t>(newest->positions.size()) / 3,
-                      Limits().max_frame_bytes);
+        find_problems(request.format(), static_cast<std::int64_t>(newest->positions.size()) / 3);
     if (request.format().velocities() && newest->velocities.empty())
       problems.push_back({"format.velocities", "were not recorded; weft record --velocities does"});
     if (!problems.empty()) return errors::field_invalid(problems);
@@ -336,13 +347,6 @@ class FrameReplay final : public v1::FrameService::Service {
     *header.mutable_format() = with_defaults(request.format());
     header.set_start_frame(start);
     return header;
-  }
-
-  Status fill(v1::Frame& message, std::int64_t number, const v1::FrameFormat& format) try {
-    message = to_proto(*player_.frame(number), with_defaults(format));
-    return Status::OK;
-  } catch (const Problem& problem) {
-    return errors::solver_failed(problem.what(), number - 1);
   }
 
   Replay& replay_;

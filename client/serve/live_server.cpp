@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "client/commands/commands.h"
+#include "client/frame_parts.h"
 #include "client/page/page.h"
 
 namespace weft::client {
@@ -74,6 +75,14 @@ WebMessage message_of(const v1::InteractResponse& response) {
   return {.bytes = to_json(response).dump()};
 }
 
+// False where the rest of a frame is still to come.
+bool is_whole(const v1::InteractResponse& /*response*/, FrameParts& /*parts*/) { return true; }
+
+bool is_whole(v1::ViewFramesResponse& response, FrameParts& parts) {
+  if (response.has_header()) parts.begin(response.header());
+  return !response.has_frame() || parts.join(*response.mutable_frame());
+}
+
 WebMessage message_of(v1::ViewFramesResponse response) {
   if (!response.has_frame()) return {.bytes = to_json(response).dump()};
   const std::string positions = std::move(*response.mutable_frame()->mutable_positions_m());
@@ -110,6 +119,7 @@ class Stream : public Conversation {
     for (Response response;;) {
       if (stream_->Read(&response)) {
         attempts_->note_message();
+        if (!is_whole(response, parts_)) continue;
         return message_of(std::move(response));
       }
       const grpc::Status status = stream_->Finish();
@@ -139,6 +149,7 @@ class Stream : public Conversation {
   std::unique_ptr<grpc::ClientContext> context_;
   std::optional<std::stop_callback<std::function<void()>>> cancel_;
   std::unique_ptr<Reader> stream_;
+  FrameParts parts_;
 };
 
 // ---- answers

@@ -5,7 +5,6 @@
 #include "server/rpc/bytes.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
-#include "server/rpc/frame_encoding.h"
 #include "server/rpc/frame_streams.h"
 #include "server/rpc/names.h"
 #include "server/rpc/server_service.h"
@@ -36,7 +35,7 @@ bool FrameCall::begin(const grpc::ServerContextBase& context) {
 void FrameCall::find(const std::string& name, const std::string& uid, const v1::FrameFormat& format,
                      std::vector<Problem> problems) {
   name_ = name;
-  format_ = format;
+  order_.format = format;
   if (const auto found = find_here(backend_, caller_.caller, name, "session")) {
     if (const auto status = take(*found, uid, std::move(problems)); !status.ok()) end(status);
     return;
@@ -60,11 +59,13 @@ grpc::Status FrameCall::take(const FoundSession& found, const std::string& uid,
                            {{"uid", session_->uid()}});
   }
   const auto particles = static_cast<std::int64_t>(session_->status().newest->positions.size()) / 3;
-  for (auto& problem : find_problems(format_, particles, backend_.limits.max_frame_bytes)) {
+  for (auto& problem : find_problems(order_.format, particles)) {
     problems.push_back(std::move(problem));
   }
   if (!problems.empty()) return errors::field_invalid(problems);
-  format_ = with_defaults(format_);
+  order_.format = with_defaults(order_.format);
+  for (const auto& sheet : session_->scene().sheets) order_.sheets.push_back(sheet.grid);
+  order_.most_bytes = backend_.limits.max_frame_bytes;
   return open();
 }
 
@@ -113,15 +114,15 @@ void FrameCall::on_done() {
 void FrameCall::read_on(bool progress_due) {
   if (writing_ || finished_) return;
   if (ending_) return finish(*ending_);
+  if (!parts_.empty()) return write_part();
   if (do_first() || !subscription_) return;
   const Reading reading = subscription_->read(wants_frame());
   switch (reading.kind) {
     case Reading::Kind::kFrame: {
-      last_frame_ = reading.frame->number;
-      const grpc::ByteBuffer message = message_of(reading);
+      parts_ = messages_of(reading);
+      frame_ = reading.frame->number;
       ++backend_.stats.frames_sent;
-      backend_.stats.bytes_sent += static_cast<std::int64_t>(message.Length());
-      return write(message);
+      return write_part();
     }
     case Reading::Kind::kNothingYet:
       if (wants_frame() && (progress_due || reading.progress.state_changes != state_changes_)) {
@@ -139,6 +140,14 @@ void FrameCall::read_on(bool progress_due) {
     case Reading::Kind::kTaken:
       return finish(errors::wrong_replica(name_, ""));
   }
+}
+
+void FrameCall::write_part() {
+  const grpc::ByteBuffer part = parts_.front();
+  parts_.erase(parts_.begin());
+  if (parts_.empty()) last_frame_ = frame_;
+  backend_.stats.bytes_sent += static_cast<std::int64_t>(part.Length());
+  write(part);
 }
 
 void FrameCall::write(const grpc::ByteBuffer& message) {
@@ -164,7 +173,7 @@ void FrameCall::write_header() {
     layout->set_columns(sheet.grid.columns);
     first_particle += sheet.particle_count();
   }
-  *header->mutable_format() = format_;
+  *header->mutable_format() = order_.format;
   header->set_start_frame(subscription_->next_frame());
   write(encoded(message));
 }

@@ -12,6 +12,7 @@
 
 #include "server/rpc/backend.h"
 #include "server/rpc/find.h"
+#include "server/rpc/frame_encoding.h"
 #include "weft/v1/frame.pb.h"
 
 namespace weft {
@@ -51,7 +52,7 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   void read_on(bool progress_due = false);
   void finish(const grpc::Status& status);
 
-  const v1::FrameFormat& format() const { return format_; }
+  const FrameOrder& order() const { return order_; }
   const Session& session() const { return *session_; }
   Subscription& subscription() { return *subscription_; }
   bool is_subscribed() const { return subscription_ != nullptr; }
@@ -67,13 +68,14 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   // Whether something came before reading on, which is now done.
   virtual bool do_first() = 0;
   virtual bool wants_frame() const { return true; }
-  virtual grpc::ByteBuffer message_of(const Reading& reading) = 0;
+  virtual std::vector<grpc::ByteBuffer> messages_of(const Reading& reading) = 0;
   virtual void start_write(const grpc::ByteBuffer* message) = 0;
   virtual void finish_call(const grpc::Status& status) = 0;
 
   grpc::Status take(const FoundSession& found, const std::string& uid,
                     std::vector<Problem> problems);
   void write_progress(const Progress& progress);
+  void write_part();
 
   Backend& backend_;
   FrameStreams& streams_;
@@ -82,14 +84,16 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
 
   StreamCaller caller_;
   std::string name_;  // of the session
-  v1::FrameFormat format_;
+  FrameOrder order_;
   std::shared_ptr<Session> session_;
   std::unique_ptr<Subscription> subscription_;
   grpc::ByteBuffer message_;  // in flight
   bool writing_ = false;
   bool finished_ = false;
-  std::optional<grpc::Status> ending_;  // as soon as nothing is in flight
-  std::optional<std::int64_t> last_frame_;
+  std::optional<grpc::Status> ending_;   // as soon as nothing is in flight
+  std::vector<grpc::ByteBuffer> parts_;  // of frame_, still to be written
+  std::int64_t frame_ = 0;
+  std::optional<std::int64_t> last_frame_;  // of which no part is left
   std::uint64_t state_changes_ = 0;
   Clock::time_point last_write_;
 };

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/model/normals.h"
 #include "core/model/text.h"
 #include "server/rpc/bytes.h"
 
@@ -18,10 +19,6 @@ namespace weft {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "planes are little-endian");
-
-std::size_t value_bytes(const v1::FrameFormat& format) {
-  return format.encoding() == v1::FRAME_ENCODING_FLOAT64 ? sizeof(double) : sizeof(float);
-}
 
 // Of all particles, as checked by find_problems: first, first + stride, ...
 struct Selection {
@@ -113,6 +110,43 @@ std::string array_of(const std::vector<double>& values, const v1::FrameFormat& f
                                    : bytes_of(selected(values, wanted), format);
 }
 
+// Their arrays, joined, are the frame's.
+std::vector<v1::Frame> in_parts(v1::Frame frame, std::int64_t most_bytes) {
+  constexpr std::size_t kRest = 256;  // number, time, stats, tags and lengths
+  const auto room = static_cast<std::size_t>(most_bytes) - kRest;
+  std::vector<v1::Frame> parts;
+  if (frame.positions_m().size() + frame.velocities_m_per_s().size() + frame.normals().size() <=
+      room) {
+    parts.push_back(std::move(frame));
+    return parts;
+  }
+  const std::string positions = std::move(*frame.mutable_positions_m());
+  const std::string velocities = std::move(*frame.mutable_velocities_m_per_s());
+  const std::string normals = std::move(*frame.mutable_normals());
+  frame.clear_positions_m();
+  frame.clear_velocities_m_per_s();
+  frame.clear_normals();
+  parts.push_back(frame);
+  std::size_t left = room;
+  const auto append = [&](const std::string& array, auto field) {
+    for (std::size_t from = 0; from < array.size();) {
+      if (left == 0) {
+        parts.back().set_continued(true);
+        parts.push_back(frame);
+        left = room;
+      }
+      const std::size_t count = std::min(left, array.size() - from);
+      (parts.back().*field)()->assign(array, from, count);
+      from += count;
+      left -= count;
+    }
+  };
+  append(positions, &v1::Frame::mutable_positions_m);
+  append(velocities, &v1::Frame::mutable_velocities_m_per_s);
+  append(normals, &v1::Frame::mutable_normals);
+  return parts;
+}
+
 }  // namespace
 
 v1::FrameFormat with_defaults(v1::FrameFormat format) {
@@ -127,16 +161,7 @@ v1::FrameFormat with_defaults(v1::FrameFormat format) {
   return format;
 }
 
-std::int64_t frame_bytes(const v1::FrameFormat& format, std::int64_t particles) {
-  constexpr std::int64_t kRest = 256;  // number, time, stats, tags and lengths
-  const auto values = static_cast<std::size_t>(3 * selection(format, particles).count);
-  std::size_t bytes = values * value_bytes(format);
-  if (format.encoding() == v1::FRAME_ENCODING_QUANTIZED_ZSTD) bytes = ZSTD_compressBound(bytes);
-  return kRest + static_cast<std::int64_t>(bytes) * (format.velocities() ? 2 : 1);
-}
-
-std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t particles,
-                                   std::int64_t most_bytes) {
+std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t particles) {
   std::vector<Problem> problems;
   if (!v1::FrameEncoding_IsValid(format.encoding())) {
     problems.push_back(
@@ -159,22 +184,18 @@ std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t p
   if (format.has_particle_count() && first >= 0 && first < particles)
     check("particle_count", format.particle_count(), 1, particles - first);
   if (format.has_stride()) check("stride", format.stride(), 1, particles);
-  if (!problems.empty()) return problems;
-  const std::int64_t bytes = frame_bytes(format, particles);
-  if (bytes > most_bytes) {
-    problems.push_back({"format", "a frame of " + std::to_string(particles) + " particles takes " +
-                                      std::to_string(bytes) + " bytes in this format; at most " +
-                                      std::to_string(most_bytes) + " are sent"});
-  }
   return problems;
 }
 
-v1::Frame to_proto(const Frame& frame, const v1::FrameFormat& format) {
+std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order) {
+  const v1::FrameFormat& format = order.format;
   v1::Frame message;
   message.set_number(frame.number);
   message.set_time_s(frame.time);
   message.set_positions_m(array_of(frame.positions, format));
   if (format.velocities()) message.set_velocities_m_per_s(array_of(frame.velocities, format));
+  if (format.normals())
+    message.set_normals(array_of(normals_of(frame.positions, order.sheets), format));
   if (format.stats()) {
     v1::FrameStats* stats = message.mutable_stats();
     stats->set_kinetic_energy_j(frame.stats.kinetic_energy);
@@ -185,17 +206,22 @@ v1::Frame to_proto(const Frame& frame, const v1::FrameFormat& format) {
     stats->set_at_rest(frame.at_rest);
     stats->set_repair_count(static_cast<std::int64_t>(frame.repairs.size()));
   }
-  return message;
+  return in_parts(std::move(message), order.most_bytes);
 }
 
-grpc::ByteBuffer encoded_frame(const Frame& frame, const v1::FrameFormat& format) {
-  const auto encoding = frame.encodings.get(format.SerializeAsString(), [&] {
-    v1::StreamFramesResponse message;
-    *message.mutable_frame() = to_proto(frame, format);
-    auto buffer = std::make_shared<const grpc::ByteBuffer>(encoded(message));
-    return Encoding{buffer, buffer->Length()};
+std::vector<grpc::ByteBuffer> encoded_frame(const Frame& frame, const FrameOrder& order) {
+  using Buffers = std::vector<grpc::ByteBuffer>;
+  const auto encoding = frame.encodings.get(order.format.SerializeAsString(), [&] {
+    auto buffers = std::make_shared<Buffers>();
+    std::size_t bytes = 0;
+    for (v1::Frame& part : to_proto(frame, order)) {
+      v1::StreamFramesResponse message;
+      *message.mutable_frame() = std::move(part);
+      bytes += buffers->emplace_back(encoded(message)).Length();
+    }
+    return Encoding{buffers, bytes};
   });
-  return *static_cast<const grpc::ByteBuffer*>(encoding.get());  // shares the bytes
+  return *static_cast<const Buffers*>(encoding.get());  // shares the bytes
 }
 
 }  // namespace weft

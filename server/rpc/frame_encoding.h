@@ -3,8 +3,10 @@
 #include <grpcpp/support/byte_buffer.h>
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "core/model/scene.h"
 #include "core/simulation.h"
 #include "server/session/frame.h"
 #include "weft/v1/frame.pb.h"
@@ -14,18 +16,20 @@ namespace weft {
 // The format with defaults filled in.
 v1::FrameFormat with_defaults(v1::FrameFormat format);
 
-// Bytes of a message with a frame of a session of so many particles, at most. Of QUANTIZED_ZSTD: as
-// long as no two neighbours are 2^31 grid steps apart.
-std::int64_t frame_bytes(const v1::FrameFormat& format, std::int64_t particles);
+// Why frames of so many particles are not sent in the format.
+std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t particles);
 
-// Why frames of such a session are not sent in the format, each within `most_bytes`.
-std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t particles,
-                                   std::int64_t most_bytes);
+// How frames of a session are sent.
+struct FrameOrder {
+  v1::FrameFormat format = {};  // with its defaults filled in and no problems
+  std::vector<Grid> sheets = {};
+  std::int64_t most_bytes = 0;  // of a message; 1024 at least
+};
 
-// The frame in a format that has its defaults filled in and no problems.
-v1::Frame to_proto(const Frame& frame, const v1::FrameFormat& format);
+// The frame, in several parts where it is too large for a message.
+std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order);
 
-// The message with this frame; its bytes are made once and shared by all who ask.
-grpc::ByteBuffer encoded_frame(const Frame& frame, const v1::FrameFormat& format);
+// The messages with this frame; their bytes are made once and shared by all who ask.
+std::vector<grpc::ByteBuffer> encoded_frame(const Frame& frame, const FrameOrder& order);
 
 }  // namespace weft

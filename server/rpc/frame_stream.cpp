@@ -6,7 +6,6 @@
 #include "server/rpc/bytes.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
-#include "server/rpc/frame_encoding.h"
 
 namespace weft {
 
@@ -58,9 +57,9 @@ bool FrameStream::do_first() {
   return true;
 }
 
-grpc::ByteBuffer FrameStream::message_of(const Reading& reading) {
+std::vector<grpc::ByteBuffer> FrameStream::messages_of(const Reading& reading) {
   repairs_.assign(reading.frame->repairs.begin(), reading.frame->repairs.end());
-  return encoded_frame(*reading.frame, format());
+  return encoded_frame(*reading.frame, order());
 }
 
 }  // namespace weft

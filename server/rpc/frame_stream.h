@@ -24,7 +24,7 @@ class FrameStream final : public grpc::ServerWriteReactor<grpc::ByteBuffer>, pub
  private:
   grpc::Status open() override;
   bool do_first() override;
-  grpc::ByteBuffer message_of(const Reading& reading) override;
+  std::vector<grpc::ByteBuffer> messages_of(const Reading& reading) override;
   void start_write(const grpc::ByteBuffer* message) override { StartWrite(message); }
   void finish_call(const grpc::Status& status) override { Finish(status); }
 

@@ -5,7 +5,6 @@
 
 #include "server/rpc/bytes.h"
 #include "server/rpc/errors.h"
-#include "server/rpc/frame_encoding.h"
 
 namespace weft {
 
@@ -69,17 +68,20 @@ bool FrameView::do_first() {
   return true;
 }
 
-grpc::ByteBuffer FrameView::message_of(const Reading& reading) {
+std::vector<grpc::ByteBuffer> FrameView::messages_of(const Reading& reading) {
   --credits_;
-  grpc::ByteBuffer frame = encoded_frame(*reading.frame, format());
-  if (reading.skipped == 0) return frame;
+  auto parts = encoded_frame(*reading.frame, order());
+  if (reading.skipped == 0) return parts;
   // a message's fields may follow each other in any order and in pieces
   v1::ViewFramesResponse rest;
   rest.set_skipped_count(reading.skipped);
-  std::vector<grpc::Slice> slices;
-  frame.Dump(&slices);
-  slices.emplace_back(rest.SerializeAsString());
-  return {slices.data(), slices.size()};
+  for (grpc::ByteBuffer& part : parts) {
+    std::vector<grpc::Slice> slices;
+    part.Dump(&slices);
+    slices.emplace_back(rest.SerializeAsString());
+    part = {slices.data(), slices.size()};
+  }
+  return parts;
 }
 
 }  // namespace weft

@@ -28,7 +28,7 @@ class FrameView final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::B
   grpc::Status open() override;
   bool do_first() override;
   bool wants_frame() const override { return credits_ > 0; }
-  grpc::ByteBuffer message_of(const Reading& reading) override;
+  std::vector<grpc::ByteBuffer> messages_of(const Reading& reading) override;
   void start_write(const grpc::ByteBuffer* message) override { StartWrite(message); }
   void finish_call(const grpc::Status& status) override { Finish(status); }
 

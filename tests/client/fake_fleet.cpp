@@ -94,6 +94,12 @@ class FakeFleet::Frames : public v1::FrameService::Service {
     const std::int64_t last = end.ok() ? request->end_frame() : start + 1;
     for (std::int64_t number = start; number <= last; ++number)
       writer->Write(frame_of<Message>(number));
+    if (!end.ok()) {  // amid a frame
+      auto part = frame_of<Message>(last + 1);
+      part.mutable_frame()->mutable_positions_m()->resize(5);
+      part.mutable_frame()->set_continued(true);
+      writer->Write(part);
+    }
     return end;
   }
 

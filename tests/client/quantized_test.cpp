@@ -4,7 +4,6 @@
 #include <random>
 
 #include "client/recording/points.h"
-#include "server/rpc/bytes.h"
 #include "server/rpc/frame_encoding.h"
 
 // What the server packs with FRAME_ENCODING_QUANTIZED_ZSTD and the client unpacks.
@@ -25,9 +24,7 @@ v1::StreamHeader header_of(double step) {
 v1::Frame packed(const std::vector<double>& positions, const v1::StreamHeader& header) {
   Frame frame;
   frame.positions = positions;
-  v1::StreamFramesResponse message;
-  EXPECT_TRUE(weft::decode(encoded_frame(frame, header.format()), message));
-  return message.frame();
+  return to_proto(frame, {.format = header.format(), .most_bytes = 1 << 20}).at(0);
 }
 
 // Positions of any size up to the farthest there are, of both signs, and 0.

@@ -91,6 +91,27 @@ TEST_F(RecordingTest, HoldsQuantizedFramesWithinHalfAStep) {
   for (std::size_t i = 0; i < wanted.y.size(); ++i) ASSERT_NEAR(found.y[i], wanted.y[i], 0.5e-4);
 }
 
+TEST_F(RecordingTest, JoinsFramesThatComeInSeveralMessages) {
+  ServerOptions options;
+  options.limits.max_frame_bytes = 1024;
+  Service narrow(options);
+  narrow.step(narrow.create(small_scene(), "cloth"), 20);
+  service_.step(session_, 20);
+  for (const std::string encoding : {"float64", "quantized"}) {
+    const auto record = [&](const std::string& address, const std::string& file) {
+      const Outcome outcome =
+          run_weft({"record", "cloth", "--from", "0", "--to", "20", "--encoding", encoding,
+                    "--velocities", "-o", file, "--server", address});
+      EXPECT_EQ(outcome.exit, 0) << outcome.err;
+      return recorded(file);
+    };
+    const std::string joined = path(encoding + "-joined.weft");
+    expect_equal(record(narrow.server.address(), joined),
+                 record(address_, path(encoding + ".weft")));
+    ask({"verify", joined});
+  }
+}
+
 TEST_F(RecordingTest, EndsAtRest) {
   const auto result = ask({"record", "cloth", "--run", "--until-rest", "-o", file_});
   EXPECT_EQ(result["at_rest"], true);

@@ -8,6 +8,8 @@
 namespace weft::testing {
 namespace {
 
+using ::testing::SizeIs;
+
 std::shared_ptr<const Frame> frame_of_100() {
   auto frame = std::make_shared<Frame>();
   frame->positions.assign(300, 0.5);
@@ -15,41 +17,60 @@ std::shared_ptr<const Frame> frame_of_100() {
   return frame;
 }
 
-bool share_bytes(const grpc::ByteBuffer& one, const grpc::ByteBuffer& two) {
+bool share_bytes(const std::vector<grpc::ByteBuffer>& one,
+                 const std::vector<grpc::ByteBuffer>& two) {
   grpc::Slice first, second;
-  EXPECT_TRUE(one.TrySingleSlice(&first).ok());
-  EXPECT_TRUE(two.TrySingleSlice(&second).ok());
+  EXPECT_TRUE(one.at(0).TrySingleSlice(&first).ok());
+  EXPECT_TRUE(two.at(0).TrySingleSlice(&second).ok());
   return first.begin() == second.begin();
 }
 
 TEST(FrameEncoding, IsMadeOnceForAllWatchersOfAFormat) {
   const auto frame = frame_of_100();
-  const v1::FrameFormat format = with_defaults({});
-  std::vector<grpc::ByteBuffer> buffers(8);
+  const FrameOrder order{.format = with_defaults({}), .most_bytes = 4096};
+  std::vector<std::vector<grpc::ByteBuffer>> buffers(8);
   {
     std::vector<std::jthread> watchers;
     for (auto& buffer : buffers) {
-      watchers.emplace_back([&] { buffer = encoded_frame(*frame, format); });
+      watchers.emplace_back([&] { buffer = encoded_frame(*frame, order); });
     }
   }
   for (const auto& buffer : buffers) EXPECT_TRUE(share_bytes(buffer, buffers[0]));
-  v1::FrameFormat other = format;
-  other.set_velocities(true);
+  FrameOrder other = order;
+  other.format.set_velocities(true);
   EXPECT_FALSE(share_bytes(encoded_frame(*frame, other), buffers[0]));
 }
 
-TEST(FrameEncoding, TakesNoMoreBytesThanIsSaid) {
+TEST(FrameEncoding, SendsNoMessageLargerThanItsBoundAndNoByteTwice) {
   const auto frame = frame_of_100();
+  FrameOrder order{.sheets = {{.rows = 4, .columns = 25}}};
+  order.format.set_velocities(true);
+  order.format.set_normals(true);
+  order.format.set_stats(true);
   for (const auto encoding : {v1::FRAME_ENCODING_FLOAT32, v1::FRAME_ENCODING_FLOAT64,
                               v1::FRAME_ENCODING_QUANTIZED_ZSTD}) {
-    for (const bool velocities : {false, true}) {
-      v1::FrameFormat format;
-      format.set_encoding(encoding);
-      format.set_velocities(velocities);
-      format.set_stats(true);
-      format = with_defaults(format);
-      EXPECT_LE(encoded_frame(*frame, format).Length(),
-                static_cast<std::size_t>(frame_bytes(format, 100)));
+    order.format.set_encoding(encoding);
+    order.format = with_defaults(order.format);
+    order.most_bytes = 1 << 20;
+    const auto all = to_proto(*frame, order);
+    ASSERT_THAT(all, SizeIs(1));
+    EXPECT_FALSE(all[0].continued());
+    for (order.most_bytes = 1024; order.most_bytes < 9000; order.most_bytes += 997) {
+      v1::Frame joined;
+      bool continued = true;
+      for (const v1::Frame& part : to_proto(*frame, order)) {
+        EXPECT_TRUE(continued);
+        EXPECT_LE(part.ByteSizeLong() + 16, order.most_bytes);
+        EXPECT_EQ(part.stats().SerializeAsString(), all[0].stats().SerializeAsString());
+        joined.mutable_positions_m()->append(part.positions_m());
+        joined.mutable_velocities_m_per_s()->append(part.velocities_m_per_s());
+        joined.mutable_normals()->append(part.normals());
+        continued = part.continued();
+      }
+      EXPECT_FALSE(continued);
+      EXPECT_EQ(joined.positions_m(), all[0].positions_m());
+      EXPECT_EQ(joined.velocities_m_per_s(), all[0].velocities_m_per_s());
+      EXPECT_EQ(joined.normals(), all[0].normals());
     }
   }
 }

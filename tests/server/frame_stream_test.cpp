@@ -1,3 +1,4 @@
+#include <Eigen/Geometry>
 #include <cstring>
 #include <thread>
 
@@ -302,17 +303,74 @@ TEST(StreamFrames, RefusesTheUidOfAnotherSessionOfThatName) {
   EXPECT_EQ(error.metadata("uid"), now.uid());
 }
 
-TEST(StreamFrames, RefusesAFormatWhoseFramesAreTooLarge) {
+TEST(StreamFrames, SendsAFrameThatFitsNoMessageInSeveral) {
   ServerOptions options = Service::in_process();
-  options.limits.max_frame_bytes = 700;
+  options.limits.max_frame_bytes = 1024;
   Service service(options);
   const v1::Session session = service.create();
+  service.step(session, 2);
+  auto request = frames_of(session, 0, 2);
+  const auto small = Stream(service, request).rest();
+  expect_numbers(small, 0, 2);
+  request.mutable_format()->set_velocities(true);
+  request.mutable_format()->set_stats(true);
+  const auto parts = Stream(service, request).rest();
+  ASSERT_THAT(parts, SizeIs(6));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    EXPECT_EQ(parts[i].number(), static_cast<std::int64_t>(i) / 2);
+    EXPECT_EQ(parts[i].continued(), i % 2 == 0);
+    EXPECT_LE(parts[i].ByteSizeLong(), 1024);
+  }
+  EXPECT_EQ(parts[4].positions_m() + parts[5].positions_m(), small[2].positions_m());
+  EXPECT_THAT(parts[4].velocities_m_per_s() + parts[5].velocities_m_per_s(),
+              SizeIs(3 * 20 * sizeof(double)));
+  EXPECT_EQ(parts[5].stats().substep_count(), session.plan().substeps_per_frame());
+}
+
+TEST(StreamFrames, ReachesClientsWithGrpcsUsualLimitsFromSheetsOfAnySize) {
+  Service service(ServerOptions{});
+  v1::Scene scene = small_scene();
+  scene.mutable_sheets(0)->mutable_grid()->set_rows(245);
+  scene.mutable_sheets(0)->mutable_grid()->set_columns(245);
+  const v1::Session session = service.create(scene);
+  grpc::ClientContext context;
+  const auto frames = v1::FrameService::NewStub(
+      grpc::CreateChannel(service.server.address(), grpc::InsecureChannelCredentials()));
   auto request = frames_of(session, 0, 0);
-  const Error error = Stream(service, request).finish();
-  EXPECT_EQ(error.code, grpc::StatusCode::INVALID_ARGUMENT);
-  EXPECT_THAT(error.fields(), ElementsAre("format"));
-  request.mutable_format()->set_encoding(v1::FRAME_ENCODING_FLOAT32);
-  EXPECT_EQ(Stream(service, request).finish().code, grpc::StatusCode::OK);
+  request.mutable_format()->set_velocities(true);
+  request.mutable_format()->set_normals(true);
+  const auto reader = frames->StreamFrames(&context, request);
+  std::size_t bytes = 0;
+  for (v1::StreamFramesResponse message; reader->Read(&message);)
+    bytes += message.frame().ByteSizeLong();
+  EXPECT_TRUE(reader->Finish().ok());
+  EXPECT_GT(bytes, 4 << 20);
+}
+
+TEST(StreamFrames, SendsNormalsOfEachSheet) {
+  Service service;
+  v1::Scene scene = small_scene();
+  *scene.add_sheets() = scene.sheets(0);
+  scene.mutable_sheets(1)->mutable_grid()->set_columns(6);
+  const v1::Session session = service.create(scene);
+  service.step(session, 30);
+  auto request = frames_of(session, 30, 30);
+  request.mutable_format()->set_normals(true);
+  const v1::Frame frame = Stream(service, request).frame();
+  const auto x = doubles(frame.positions_m()), n = doubles(frame.normals());
+  ASSERT_THAT(n, SizeIs(3 * 44));
+  const auto at = [](const std::vector<double>& values, std::size_t particle) {
+    return Eigen::Vector3d(values[particle], values[44 + particle], values[88 + particle]);
+  };
+  const auto expect_normal = [&](std::size_t of, std::size_t right, std::size_t left,
+                                 std::size_t below, std::size_t above) {
+    EXPECT_NEAR(at(n, of).norm(), 1, 1e-14);
+    EXPECT_NEAR(at(n, of).dot((at(x, right) - at(x, left)).normalized()), 0, 1e-14);
+    EXPECT_NEAR(at(n, of).dot((at(x, below) - at(x, above)).normalized()), 0, 1e-14);
+  };
+  expect_normal(7, 8, 6, 12, 2);
+  expect_normal(20 + 8, 20 + 9, 20 + 7, 20 + 14, 20 + 2);
+  expect_normal(20, 21, 20, 26, 20);  // a corner
 }
 
 TEST(StreamFrames, RefusesMoreStreamsThanItsLimit) {

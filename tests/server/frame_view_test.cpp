@@ -123,6 +123,28 @@ TEST(ViewFrames, ServesWhatWasGrantedWhenTheClientHalfCloses) {
   EXPECT_EQ(view.finish().code, grpc::StatusCode::OK);
 }
 
+TEST(ViewFrames, TakesOneCreditForAFrameThatComesInSeveralMessages) {
+  ServerOptions options = listening();
+  options.limits.max_frame_bytes = 1024;
+  Service service(options);
+  const v1::Session session = service.create();
+  service.step(session, 5);
+  auto request = view_of(session, 1);
+  request.mutable_format()->set_encoding(v1::FRAME_ENCODING_FLOAT64);
+  request.mutable_format()->set_velocities(true);
+  View view(service, request);
+  EXPECT_TRUE(view.frame().frame().continued());
+  EXPECT_FALSE(view.frame().frame().continued());
+  service.step(session, 9);
+  view.grant(1);
+  for (const bool continued : {true, false}) {
+    const v1::ViewFramesResponse part = view.frame();
+    EXPECT_EQ(part.frame().number(), 14);
+    EXPECT_EQ(part.frame().continued(), continued);
+    EXPECT_EQ(part.skipped_count(), 8);
+  }
+}
+
 TEST(ViewFrames, EndsWithItsSessionAlsoWithoutACredit) {
   Service service(listening());
   const v1::Session session = service.create();

@@ -46,8 +46,9 @@ Fleet::Fleet(std::size_t replicas, const std::string& hard_stop) {
                     std::vector<std::string>{"LD_PRELOAD=" + path("bad-disk.so"),
                                              "WEFT_BAD_DISK=" + path("disk")});
   for (std::size_t number = 0; number < replicas; ++number) {
-    replicas_.push_back(std::make_unique<Weftd>(std::vector<std::string>{
-        "--database", database_->url(), "--replica", name(number), "--snapshot-ms", "100"}));
+    replicas_.push_back(std::make_unique<Weftd>(
+        std::vector<std::string>{"--database", database_->url(), "--replica", name(number),
+                                 "--snapshot-ms", "100", "--history-bytes", "4194304"}));
   }
   start_balancer(hard_stop);
 }

@@ -16,6 +16,7 @@
 #include "client/templates/templates.h"
 #include "tests/stress/stress.h"
 #include "tests/stress/weftd.h"
+#include "tests/support/service/postgres.h"
 
 namespace weft::stress {
 namespace {
@@ -27,9 +28,10 @@ struct Cost {
   double stored = 0;  // bytes/s, to disk
   double memory = 0;  // bytes, kHistory of frames of each among them
   bool clean = false;
+  double database = 0;  // cores of PostgreSQL, where there is one
 
   Cost times(double count) const {
-    return {count * cores, count * sent, count * stored, count * memory, clean};
+    return {count * cores, count * sent, count * stored, count * memory, clean, count * database};
   }
 };
 
@@ -57,13 +59,21 @@ Cost cost_of(const Weftd& weftd, int sessions, std::chrono::duration<double> dur
           .clean = load.clean()};
 }
 
-// The same for several servers at a time, together.
-Cost cost_of_replicas(int replicas, int sessions, std::chrono::duration<double> duration) {
+// The same for several servers at a time, together; they may share a database.
+Cost cost_of_replicas(int replicas, int sessions, std::chrono::duration<double> duration,
+                      const testing::Postgres* database = nullptr) {
   std::vector<std::unique_ptr<Weftd>> all;
   std::vector<std::future<Cost>> costs;
-  for (int i = 0; i < replicas; ++i)
-    all.push_back(std::make_unique<Weftd>(
-        std::vector<std::string>{"--history-bytes", std::to_string(kHistory)}));
+  for (int i = 0; i < replicas; ++i) {
+    std::vector<std::string> flags{"--history-bytes", std::to_string(kHistory)};
+    if (database != nullptr) {
+      flags.insert(flags.end(),
+                   {"--database", database->url(), "--replica", fmt::format("weftd-{}", i + 1)});
+    }
+    all.push_back(std::make_unique<Weftd>(flags));
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  const double before = database != nullptr ? database->cpu_s() : 0;
   for (const auto& weftd : all)
     costs.push_back(std::async(std::launch::async, cost_of, std::cref(*weftd), sessions, duration));
   Cost sum{.clean = true};
@@ -72,6 +82,8 @@ Cost cost_of_replicas(int replicas, int sessions, std::chrono::duration<double> 
     sum = {sum.cores + cost.cores, sum.sent + cost.sent, sum.stored + cost.stored,
            sum.memory + cost.memory, sum.clean && cost.clean};
   }
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - begin;
+  if (database != nullptr) sum.database = (database->cpu_s() - before) / wall.count();
   return sum;
 }
 
@@ -94,8 +106,8 @@ std::string machines_for(int sessions, const Cost& each) {
 }  // namespace
 
 // What a session of `load` at 60 frames/s with one subscriber costs, and how many machines like
-// this one that makes. Held to replicas that share this machine: what two and three of them use
-// must be two and three times what one does.
+// this one that makes. Held to replicas that share this machine, with disks of their own and with a
+// database: what several use must be as many times what one does.
 Outcome sizing(Form form) {
   constexpr double kHold = 0.2;
   const bool is_short = form == Form::kShort;
@@ -110,16 +122,24 @@ Outcome sizing(Form form) {
                       each.cores, client::bytes_text(std::llround(each.memory)),
                       client::bytes_text(kHistory), client::bytes_text(std::llround(each.sent)),
                       client::bytes_text(std::llround(each.stored))),
-      .hold = fmt::format("2 and 3 replicas: 2 and 3 times as much, within {:.0f} %", 100 * kHold),
+      .hold = fmt::format("replicas: as many times as much, within {:.0f} %", 100 * kHold),
       .counts = one.clean};
   for (const int count : {1000, 10'000, 100'000})
     outcome.figure += "; " + machines_for(count, each);
-  for (const int replicas : {2, 3}) {
-    const Cost cost = cost_of_replicas(replicas, sessions, duration);
+  const auto hold = [&](int replicas, const Cost& cost) {
     const double off = cost.cores / (replicas * one.cores) - 1;
-    outcome.figure += fmt::format("; {} replicas: cores {:+.1f} %", replicas, 100 * off);
     outcome.counts = outcome.counts && cost.clean;
     outcome.bounds = outcome.bounds && std::abs(off) <= kHold;
+    return fmt::format("; {} replicas: cores {:+.1f} %", replicas, 100 * off);
+  };
+  for (const int replicas : {2, 3})
+    outcome.figure += hold(replicas, cost_of_replicas(replicas, sessions, duration));
+  outcome.figure += "; with a database";
+  for (const int replicas : {1, 2, 3}) {
+    const testing::Postgres database;
+    const Cost cost = cost_of_replicas(replicas, sessions, duration, &database);
+    outcome.figure += hold(replicas, cost) + fmt::format(", PostgreSQL {:.4f} a session",
+                                                         cost.database / (replicas * sessions));
   }
   return outcome;
 }

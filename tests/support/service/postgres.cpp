@@ -9,6 +9,8 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <stdexcept>
 #include <thread>
 
@@ -44,6 +46,14 @@ Process run(std::vector<std::string> words, const std::string& output) {
   return {program, words, output, 0, {"LC_ALL=C"}};
 }
 
+// What /proc/PID/stat says behind the name: the state, the parent, ... Empty where there is none.
+std::vector<std::string> facts_of(const std::string& process) {
+  std::string stat;
+  std::getline(std::ifstream("/proc/" + process + "/stat"), stat, '\0');
+  std::istringstream facts(stat.substr(std::min(stat.size(), stat.rfind(')') + 1)));
+  return {std::istream_iterator<std::string>(facts), {}};
+}
+
 // Every process whose parent it is, and itself.
 std::vector<pid_t> family_of(pid_t parent) {
   std::vector<pid_t> family{parent};
@@ -51,11 +61,8 @@ std::vector<pid_t> family_of(pid_t parent) {
   for (const auto& entry : fs::directory_iterator("/proc", error)) {
     const std::string name = entry.path().filename().string();
     if (name.find_first_not_of("0123456789") != std::string::npos) continue;
-    std::string stat;
-    std::getline(std::ifstream(entry.path() / "stat"), stat);
-    const std::size_t after_name = stat.rfind(')');
-    if (after_name == std::string::npos) continue;
-    if (std::stol(stat.substr(after_name + 4)) == parent) family.push_back(std::stoi(name));
+    const auto facts = facts_of(name);
+    if (facts.size() > 1 && facts[1] == std::to_string(parent)) family.push_back(std::stoi(name));
   }
   return family;
 }
@@ -122,6 +129,15 @@ void Postgres::start() {
 
 void Postgres::freeze() const {
   for (const pid_t process : family_of(process_->id())) kill(process, SIGSTOP);
+}
+
+double Postgres::cpu_s() const {
+  double ticks = 0;
+  for (const pid_t process : family_of(process_->id())) {
+    const auto facts = facts_of(std::to_string(process));
+    if (facts.size() > 12) ticks += std::stod(facts[11]) + std::stod(facts[12]);
+  }
+  return ticks / static_cast<double>(sysconf(_SC_CLK_TCK));
 }
 
 void Postgres::thaw() const {

@@ -37,6 +37,9 @@ class Postgres {
   void freeze() const;
   void thaw() const;
 
+  // Processor time that it and its connections have used.
+  double cpu_s() const;
+
  private:
   TemporaryDirectory directory_;
   std::vector<std::string> settings_, environment_;

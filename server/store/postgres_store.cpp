@@ -13,9 +13,12 @@
 
 #include "server/store/postgres_connection.h"
 #include "server/store/postgres_tables.h"
+#include "server/store/postgres_values.h"
 #include "server/store/records.h"
+#include "server/store/snapshot_table.h"
 #include "server/store/snapshots.h"
 #include "server/store/store.h"
+#include "server/store/tenures.h"
 #include "server/store/write_queue.h"
 
 namespace weft {
@@ -30,10 +33,6 @@ constexpr milliseconds kFirstPause{50}, kLongestPause{1000};  // before work is 
 constexpr int kOrphans = 4;                                   // that are named at a time
 constexpr std::int64_t kFewEntries = 256;                     // that are not worth forgetting
 
-pqxx::binarystring binary(const std::string& bytes) { return {bytes.data(), bytes.size()}; }
-std::string bytes_of(const pqxx::field& field) { return pqxx::binarystring(field).str(); }
-std::int64_t number_of(const pqxx::field& field) { return field.as<std::int64_t>(); }
-
 const std::vector<PostgresConnection::Statement> kLogStatements = {
     {"progress",
      "UPDATE weft.session SET progress = $4, checksum = $5 "
@@ -41,111 +40,6 @@ const std::vector<PostgresConnection::Statement> kLogStatements = {
     {"entry",
      "INSERT INTO weft.entry VALUES ($1, $2, $3, $4) ON CONFLICT (uid, number) "
      "DO UPDATE SET record = excluded.record, checksum = excluded.checksum"}};
-const std::vector<PostgresConnection::Statement> kSnapshotStatements = {
-    {"write",
-     "INSERT INTO weft.snapshot SELECT uid, $2::text, $3::bytea FROM weft.session "
-     "WHERE uid = $1 AND owner = $4 AND epoch = $5 "
-     "ON CONFLICT (uid, name) DO UPDATE SET content = excluded.content"}};
-
-// Under which a server has a session, and writes of it are taken.
-struct Tenure {
-  std::int64_t owner = 0;
-  std::int64_t epoch = 0;
-};
-
-// The sessions that a server has. Thread-safe.
-class Tenures {
- public:
-  void set(const std::string& uid, const Tenure& tenure) {
-    std::lock_guard lock(mutex_);
-    tenures_[uid] = tenure;
-  }
-  // An epoch that no session has, where it is not one of them.
-  Tenure of(const std::string& uid) const {
-    std::lock_guard lock(mutex_);
-    const auto found = tenures_.find(uid);
-    return found == tenures_.end() ? Tenure{} : found->second;
-  }
-  bool erase(const std::string& uid) {
-    std::lock_guard lock(mutex_);
-    return tenures_.erase(uid) > 0;
-  }
-  std::set<std::string> uids() const {
-    std::lock_guard lock(mutex_);
-    std::set<std::string> uids;
-    for (const auto& [uid, tenure] : tenures_) uids.insert(uid);
-    return uids;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::map<std::string, Tenure> tenures_;
-};
-
-class SnapshotTable final : public SnapshotShelf {
- public:
-  SnapshotTable(const std::string& url, const Tenures& tenures)
-      : connection_(url, kSnapshotStatements), tenures_(tenures) {}
-
-  std::vector<Item> list(const std::string& uid, Folder folder) override {
-    const bool named = folder == Folder::kNamed;
-    std::vector<Item> items;
-    connection_.run([&](pqxx::work& transaction) {
-      items.clear();
-      for (const auto& row :
-           transaction.exec_params("SELECT name, length(content) FROM weft.snapshot WHERE uid = $1 "
-                                   "AND starts_with(name, 'named/') = $2",
-                                   uid, named)) {
-        items.push_back({row[0].as<std::string>().substr(named ? 6 : 0), number_of(row[1])});
-      }
-    });
-    return items;
-  }
-
-  void write(const std::string& uid, const std::string& name, const std::string& bytes) override {
-    const Tenure tenure = tenures_.of(uid);
-    std::size_t written = 0;
-    connection_.run([&](pqxx::work& transaction) {
-      written =
-          transaction.exec_prepared("write", uid, name, binary(bytes), tenure.owner, tenure.epoch)
-              .affected_rows();
-    });
-    if (written == 0) throw StoreError("the session is another server's now, or deleted");
-  }
-
-  std::string read(const std::string& uid, const std::string& name) override {
-    std::optional<std::string> content;
-    connection_.run([&](pqxx::work& transaction) {
-      const auto rows = transaction.exec_params(
-          "SELECT content FROM weft.snapshot WHERE uid = $1 AND name = $2", uid, name);
-      if (!rows.empty()) content = bytes_of(rows[0][0]);
-    });
-    if (!content) throw StoreError("it is gone");
-    return *content;
-  }
-
-  void remove(const std::string& uid, const std::string& name) override try {
-    const Tenure tenure = tenures_.of(uid);
-    connection_.run([&](pqxx::work& transaction) {
-      transaction.exec_params(
-          "DELETE FROM weft.snapshot n USING weft.session s WHERE n.uid = $1 AND n.name = $2 "
-          "AND s.uid = $1 AND s.owner = $3 AND s.epoch = $4",
-          uid, name, tenure.owner, tenure.epoch);
-    });
-  } catch (const StoreError& error) {
-    spdlog::warn("{} cannot be removed: {}", place_of(uid, name), error.what());
-  }
-
-  void remove_all(const std::string& /*uid*/) override {}  // they go with their session
-
-  std::string place_of(const std::string& uid, const std::string& name) const override {
-    return "snapshot " + name + " of session " + uid + " in " + connection_.place();
-  }
-
- private:
-  PostgresConnection connection_;
-  const Tenures& tenures_;
-};
 
 // Work on a session that is another server's now changes nothing, and says so.
 class PostgresStore final : public SessionStore {

@@ -106,6 +106,13 @@ void drop_on_sphere(v1::Scene& scene, v1::Sheet& sheet) {
   drop(sheet, 2 * kRadius);
 }
 
+// For a sheet that is pulled off its body.
+void add_floor(v1::Scene& scene) {
+  v1::Collider* floor = scene.add_colliders();
+  floor->set_name("floor");
+  set(floor->mutable_plane()->mutable_normal(), 0, 1, 0);
+}
+
 v1::Scene hang(const TemplateOptions& options) {
   v1::Scene scene;
   v1::Sheet* sheet = add_sheet(scene, {}, options);
@@ -117,12 +124,14 @@ v1::Scene hang(const TemplateOptions& options) {
 v1::Scene box(const TemplateOptions& options) {
   v1::Scene scene;
   drop_on_box(scene, *add_sheet(scene, {}, options));
+  add_floor(scene);
   return scene;
 }
 
 v1::Scene sphere(const TemplateOptions& options) {
   v1::Scene scene;
   drop_on_sphere(scene, *add_sheet(scene, {}, options));
+  add_floor(scene);
   return scene;
 }
 

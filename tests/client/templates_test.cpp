@@ -108,6 +108,14 @@ TEST(Templates, start_a_falling_sheet_centred_and_a_few_millimetres_above_its_bo
   }
 }
 
+TEST(Templates, have_a_floor_under_the_bodies_of_ordinary_sheets) {
+  for (const char* name : {"box", "sphere"}) {
+    const v1::Scene scene = make_template(name);
+    ASSERT_EQ(scene.colliders_size(), 2) << name;
+    EXPECT_TRUE(scene.colliders(1).has_plane()) << name;
+  }
+}
+
 TEST(Templates, evaluate_the_paper_s_fourth_sheet_with_segments_or_exactly) {
   const auto law = [](const TemplateOptions& options) {
     return only_sheet(make_template("paper-4", options)).bending().choi_ko();

@@ -1,4 +1,5 @@
 #include <spdlog/spdlog.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -10,7 +11,7 @@
 
 namespace {
 
-// Ctrl-C asks for an end; a second one takes it.
+// Ctrl-C, or a terminal that closes, asks for an end; a second one takes it.
 void wait_for_signals(sigset_t signals, std::stop_source stop) {
   int signal = 0;
   sigwait(&signals, &signal);
@@ -26,7 +27,10 @@ int main(int argc, char** argv) {
   sigemptyset(&signals);
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // before any thread starts
+  struct sigaction hangup {};
+  sigaction(SIGHUP, nullptr, &hangup);
+  if (hangup.sa_handler != SIG_IGN) sigaddset(&signals, SIGHUP);  // nohup wants it ignored
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);                  // before any thread starts
   std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error to report
   std::stop_source stop;
   std::thread(wait_for_signals, signals, stop).detach();
@@ -35,7 +39,9 @@ int main(int argc, char** argv) {
   spdlog::set_level(spdlog::level::off);
   setenv("GRPC_VERBOSITY", "NONE", 0);
 
+  winsize size{};
+  ioctl(STDOUT_FILENO, TIOCGWINSZ, &size);
   const weft::client::Terminal terminal{std::cout, std::cerr, isatty(STDOUT_FILENO) == 1,
-                                        isatty(STDERR_FILENO) == 1};
+                                        isatty(STDERR_FILENO) == 1, size.ws_col};
   return weft::client::run_weft({argv + 1, argv + argc}, terminal, stop.get_token());
 }

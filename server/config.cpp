@@ -39,7 +39,7 @@ std::vector<Number> numbers(Config& config) {
       {"max_particles", &limits.max_particles_per_session, 4, kMostParticles,
        "Particles in one session"},
       {"max_particles_per_principal", &limits.max_particles_per_principal, 4, kMostParticles,
-       "Particles in all sessions of one principal"},
+       "Particles of one principal"},
       {"max_total_particles", &limits.max_total_particles, 4, kMostParticles,
        "Particles in all sessions"},
       {"max_streams", &limits.max_streams, 1, 100'000, "Streams at a time"},
@@ -48,12 +48,12 @@ std::vector<Number> numbers(Config& config) {
       {"max_snapshots_per_session", &limits.max_snapshots_per_session, 1, 1000,
        "Snapshots on demand of one session"},
       {"idle_s", &config.idle_s, 0, 31'536'000,
-       "Seconds unused after which a paused session is kept in the store alone; 0: never"},
+       "Seconds after which an unused paused session\nis kept in the store alone; 0: never"},
       {"max_tests", &limits.max_tests, 1, 256, "Tests of textiles at a time"},
       {"history_bytes", &limits.history_bytes_per_session, kMiB, 1024 * kMiB * 64,
-       "Bytes of frames that a session keeps for its streams"},
+       "Bytes of frames a session keeps"},
       {"snapshot_ms", &server.snapshot_ms, 0, 3'600'000,
-       "Milliseconds of computing that a session writes a snapshot after, which restarts begin at"},
+       "Milliseconds of computing between snapshots,\nat which restarts begin"},
   };
 }
 
@@ -74,19 +74,18 @@ std::vector<Text> texts(Config& config, TlsOptions& tls) {
   ServerOptions& server = config.server;
   return {
       {"host", &server.host, "ADDRESS", "Address to listen on [" + *server.host + "]"},
-      {"metrics", &server.metrics, "ADDRESS",
-       "Address and port to serve Prometheus' metrics at, or none"},
+      {"metrics", &server.metrics, "ADDRESS", "Address and port of Prometheus' metrics, or none"},
       {"data_dir", &server.data_dir, "DIR", "Directory that keeps sessions, or none"},
       {"database", &server.database, "URL",
-       "PostgreSQL database that keeps them instead, for several servers, or none"},
+       "PostgreSQL database that keeps them instead, for\nseveral servers, or none"},
       {"replica", &server.replica, "NAME",
-       "What the others and the load balancer call this server [the host's name]"},
+       "What the others and the load balancer call this\nserver [the host's name]"},
       {"tls_cert", &tls.certificate, "FILE", "Certificate chain (PEM): encrypts, needs --tls-key"},
       {"tls_key", &tls.key, "FILE", "Its key (PEM, no passphrase)"},
       {"tls_client_ca", &tls.client_ca, "FILE",
-       "Certificates (PEM): clients need one that these signed, which says who they are"},
+       "Certificates (PEM): clients need one that these\nsigned, which says who they are"},
       {"tokens", &server.tokens, "FILE",
-       "Who may call: lines PRINCIPAL SHA256 [admin], as weft token writes them"},
+       "Who may call: lines PRINCIPAL SHA256 [admin], as\nweft token writes them"},
   };
 }
 
@@ -226,7 +225,7 @@ Config read_config(int argc, const char* const* argv) {
                "weftd");
   std::string file, log_level;
   bool insecure = false;
-  app.add_option("--config", file, "TOML file; its keys are the flags below, with _ for -")
+  app.add_option("--config", file, "TOML file; its keys are these flags, with _ for -")
       ->type_name("FILE");
   TlsOptions tls;
   const auto known_texts = texts(config, tls);
@@ -248,17 +247,19 @@ Config read_config(int argc, const char* const* argv) {
         ->type_name("N");
   }
   app.footer(
-      "Prints \"weftd listening on ADDRESS:PORT\" when it serves; logs to stderr. SIGTERM or\n"
-      "SIGINT ends every stream and call and exits with 0. Sessions are kept, unless told\n"
-      "otherwise, in $STATE_DIRECTORY, $XDG_STATE_HOME/weft or ~/.local/state/weft.\n"
+      "Prints \"weftd listening on ADDRESS:PORT\" when it serves; logs to stderr. SIGTERM\n"
+      "or SIGINT ends every stream and call and exits with 0. Sessions are kept, unless\n"
+      "told otherwise, in $STATE_DIRECTORY, $XDG_STATE_HOME/weft or\n"
+      "~/.local/state/weft.\n"
       "\n"
-      "Servers with the same --database share its sessions. The URL, or a connection string of\n"
-      "libpq, can be in $WEFT_DATABASE instead, its password in a PGPASSFILE; neither is logged.\n"
+      "Servers with the same --database share its sessions. The URL, or a connection\n"
+      "string of libpq, can be in $WEFT_DATABASE instead, its password in a PGPASSFILE;\n"
+      "neither is logged.\n"
       "\n"
-      "Files of TLS are read anew within seconds of a change; while certificate and key do not\n"
-      "belong together, no new connection is taken. Tokens are read once, at the start. With\n"
-      "--tokens or --tls-client-ca, sessions are their principal's: whom a token names or, where\n"
-      "none is sent, the common name of the client's certificate.");
+      "Files of TLS are read anew within seconds of a change; while certificate and key\n"
+      "do not belong together, no new connection is taken. Tokens are read once, at the\n"
+      "start. With --tokens or --tls-client-ca, sessions are their principal's: whom a\n"
+      "token names or, where none is sent, the common name of the client's certificate.");
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {

@@ -102,7 +102,8 @@ void run_script(Context& context, const ScriptOptions& options) {
     file.write(report_junit(script, results));
     file.close();
   }
-  context.answer(report_json(script, results), report_text(script, results));
+  context.answer(report_json(script, results),
+                 report_text(script, results, context.terminal.columns));
   std::size_t failed = 0;
   for (const CaseResult& result : results) failed += result.passed() ? 0 : 1;
   if (failed == 0) return;
@@ -114,7 +115,7 @@ void run_script(Context& context, const ScriptOptions& options) {
 constexpr const char* kFooter =
     R"(A script is YAML; all that is wrong with it is said before anything runs:
 
-  for: {textile: [denim_11oz, wool_tropical], rows: [11, 21]}  # cases: all pairs
+  for: {textile: [denim_11oz, wool_tropical], rows: [11, 21]}  # 4 cases
   parallel: 2                                                  # cases at a time
   variables: {longest: 10}
   steps:

@@ -32,7 +32,8 @@ void run_list(Context& context) {
                known(seconds_text(session.time_s())), known(session.at_rest() ? "yes" : "no"),
                std::to_string(session.scene().sheets_size())});
   }
-  context.answer(to_json(all), all.sessions().empty() ? "no sessions\n" : table.text());
+  context.answer(to_json(all),
+                 all.sessions().empty() ? "no sessions\n" : table.text(context.terminal.columns));
 }
 
 void run_get(Context& context, const std::string& name) {
@@ -68,7 +69,8 @@ void run_snapshots(Context& context, const std::string& session) {
                snapshot.numerics_id(),
                snapshot.damage().empty() ? "sound" : "damaged: " + snapshot.damage()});
   }
-  context.answer(to_json(all), all.snapshots().empty() ? "no snapshots\n" : table.text());
+  context.answer(to_json(all),
+                 all.snapshots().empty() ? "no snapshots\n" : table.text(context.terminal.columns));
 }
 
 struct RestoreOptions {

@@ -22,7 +22,7 @@ void list_textiles(Context& context) {
                number_text(textile.values().areal_density_kg_per_m2()),
                textile.missing().empty() ? status : "incomplete"});
   }
-  context.answer(to_json(all), table.text());
+  context.answer(to_json(all), table.text(context.terminal.columns));
 }
 
 // Place of a word in the list, from 1; at its end where it is new.
@@ -61,7 +61,8 @@ void run_show(Context& context, const std::string& name) {
   std::string notes;
   for (std::size_t i = 0; i < sources.size(); ++i)
     notes += fmt::format("[{}]  {}\n", i + 1, sources[i]);
-  context.answer(to_json(textile), facts.text() + '\n' + table.text() + '\n' + wrapped(notes));
+  context.answer(to_json(textile), facts.text() + '\n' + table.text(context.terminal.columns) +
+                                       '\n' + wrapped(notes));
 }
 
 struct SetOptions {

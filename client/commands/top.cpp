@@ -79,7 +79,7 @@ std::string server_text(const v1::ServerStats& now, const v1::ServerStats& befor
 }
 
 // The busiest first.
-std::string sessions_text(const Look& now, const Look& before) {
+std::string sessions_text(const Look& now, const Look& before, std::size_t columns) {
   const double seconds = now.stats.uptime_s() - before.stats.uptime_s();
   std::map<std::string, double> times;
   for (const auto& session : before.sessions.sessions()) times[session.uid()] = session.time_s();
@@ -101,7 +101,7 @@ std::string sessions_text(const Look& now, const Look& before) {
                seconds_text(session->time_s()), fmt::format("{:.2f} x", speed),
                seconds_text(session->lateness_s()), session->at_rest() ? "yes" : "no"});
   }
-  std::string text = rows.empty() ? "no sessions\n" : table.text();
+  std::string text = rows.empty() ? "no sessions\n" : table.text(columns);
   if (rows.size() > shown) text += fmt::format("{} more are slower\n", rows.size() - shown);
   return text;
 }
@@ -112,7 +112,8 @@ void show(Context& context, Status& status, const Look& now, const Look& before)
     json["stats"] = to_json(now.stats);
     return context.answer(json, "");
   }
-  const std::string text = server_text(now.stats, before.stats) + '\n' + sessions_text(now, before);
+  const std::string text = server_text(now.stats, before.stats) + '\n' +
+                           sessions_text(now, before, context.terminal.columns);
   if (!context.terminal.out_is_watched) return context.answer({}, text);
   std::vector<std::string> lines;
   std::istringstream stream(text);

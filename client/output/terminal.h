@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <ostream>
 
 namespace weft::client {
@@ -10,6 +11,7 @@ struct Terminal {
   std::ostream& err;
   bool out_is_watched = false;
   bool err_is_watched = false;
+  std::size_t columns = 0;  // of out where it is watched; 0: any number
 };
 
 }  // namespace weft::client

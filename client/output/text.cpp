@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <numeric>
 #include <sstream>
 
 namespace weft::client {
@@ -19,6 +20,13 @@ bool is_number_like(std::string_view cell) {
 std::string without_trailing_spaces(std::string line) {
   line.erase(line.find_last_not_of(' ') + 1);
   return line;
+}
+
+// "sessions/a-ver...-long-name"; width is at least 3.
+std::string shortened(const std::string& cell, std::size_t width) {
+  if (cell.size() <= width) return cell;
+  const std::size_t kept = width - 3, end = kept / 2;
+  return cell.substr(0, kept - end) + "..." + cell.substr(cell.size() - end);
 }
 
 }  // namespace
@@ -84,7 +92,7 @@ std::string Facts::text() const {
   return wrapped(text);
 }
 
-std::string Table::text() const {
+std::string Table::text(std::size_t columns) const {
   std::vector<std::size_t> widths(rows_.front().size());
   std::vector<bool> right(widths.size(), rows_.size() > 1);
   for (std::size_t r = 0; r < rows_.size(); ++r) {
@@ -93,13 +101,19 @@ std::string Table::text() const {
       right[c] = right[c] && (r == 0 || is_number_like(rows_[r][c]));
     }
   }
+  // the widest gives way, down to 8
+  const std::size_t all = std::accumulate(widths.begin(), widths.end(), 2 * (widths.size() - 1));
+  const auto widest = std::max_element(widths.begin(), widths.end());
+  const std::size_t spare = *widest - std::min<std::size_t>(*widest, 8);
+  if (columns > 0 && all > columns) *widest -= std::min(all - columns, spare);
   std::string text;
   for (const auto& row : rows_) {
     std::string line;
     for (std::size_t c = 0; c < widths.size(); ++c) {
       if (c > 0) line += "  ";
-      line += right[c] ? fmt::format("{:>{}}", row[c], widths[c])
-                       : fmt::format("{:<{}}", row[c], widths[c]);
+      const std::string cell = shortened(row[c], widths[c]);
+      line += right[c] ? fmt::format("{:>{}}", cell, widths[c])
+                       : fmt::format("{:<{}}", cell, widths[c]);
     }
     text += without_trailing_spaces(std::move(line)) + '\n';
   }

@@ -37,7 +37,8 @@ class Table {
  public:
   explicit Table(std::vector<std::string> heading) : rows_{std::move(heading)} {}
   void add(std::vector<std::string> row) { rows_.push_back(std::move(row)); }
-  std::string text() const;
+  // Where it has more columns than a terminal, its longest names lose their middle. 0: any number.
+  std::string text(std::size_t columns = 0) const;
 
  private:
   std::vector<std::vector<std::string>> rows_;

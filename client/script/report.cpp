@@ -27,7 +27,8 @@ std::int64_t failed(const std::vector<CaseResult>& results) {
 
 }  // namespace
 
-std::string report_text(const Script& script, const std::vector<CaseResult>& results) {
+std::string report_text(const Script& script, const std::vector<CaseResult>& results,
+                        std::size_t columns) {
   Table table({"CASE", "RESULT", "STEPS", "WALL"});
   std::string failures;
   for (std::size_t i = 0; i < results.size(); ++i) {
@@ -38,7 +39,7 @@ std::string report_text(const Script& script, const std::vector<CaseResult>& res
     for (const Failure& failure : result.failures)
       failures += fmt::format("{}: {}\n", script.cases[i].name, failure_text(script, failure));
   }
-  return table.text() + (failures.empty() ? "" : '\n' + failures);
+  return table.text(columns) + (failures.empty() ? "" : '\n' + failures);
 }
 
 Json report_json(const Script& script, const std::vector<CaseResult>& results) {

@@ -216,6 +216,19 @@ TEST_F(CommandsTest, TheLastLookOfTopStaysOnATerminal) {
   EXPECT_THAT(out.str(), AllOf(HasSubstr("sessions "), Not(HasSubstr("\x1b[J"))));
 }
 
+TEST_F(CommandsTest, LongNamesLoseTheirMiddleOnATerminalAlone) {
+  const std::string name = "a-" + std::string(40, 'x') + "-name";
+  ask({"scene", "new", "--template", "hang", "-o", path("scene.json")});
+  ask({"session", "create", path("scene.json"), "--id", name});
+  ask({"session", "create", path("scene.json"), "--id", "short"});
+  std::ostringstream out, err;
+  client::run_weft({"session", "list", "--server", address_}, {out, err, true, true, 60}, {});
+  EXPECT_THAT(out.str(), AllOf(HasSubstr("sessions/a...xxxx-name  ")));
+  EXPECT_THAT(out.str(), HasSubstr("sessions/short "));
+  EXPECT_THAT(lines_of(out.str()), Each(SizeIs(Le(60))));
+  EXPECT_THAT(weft({"session", "list"}).out, HasSubstr("sessions/" + name + "  paused"));
+}
+
 TEST_F(CommandsTest, HelpOfEveryCommandAndTopicFits80Columns) {
   const auto words = [](std::vector<std::string> before) {
     before.insert(before.begin(), {"completion", "words", "help"});

@@ -11,6 +11,7 @@
 namespace weft::testing {
 namespace {
 
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -176,6 +177,10 @@ class TomlFile {
  private:
   char path_[32] = "/tmp/weft-config-XXXXXX";
 };
+
+TEST(Config, HelpFits80Columns) {
+  EXPECT_THAT(refusal({"--help"}), Not(ContainsRegex("[^\n]{81}")));
+}
 
 TEST(Config, TakesFlagsBeforeTheFileAndTheFileBeforeDefaults) {
   const TomlFile file("port = 4000\nmax_sessions = 5\nlog_level = \"warn\"\n");

@@ -98,6 +98,12 @@ std::string token_of(const Credentials& given, const std::string& address) {
   return token;
 }
 
+// "Connection refused" of gRPC's chain of causes, which lie behind colons.
+std::string_view cause_of(std::string_view text) {
+  const std::size_t colon = text.rfind(": ");
+  return colon == std::string_view::npos ? text : text.substr(colon + 2);
+}
+
 }  // namespace
 
 // Opens channels to one server.
@@ -227,7 +233,7 @@ void Connection::check(const grpc::Status& status) const {
   Problem problem = server_problem(status);
   if (problem.exit != Exit::kNoConnection) throw problem;
   throw Problem(problem.exit, problem.code, problem.reason,
-                fmt::format("no connection to {} ({}); {}", address_, problem.what(),
+                fmt::format("no connection to {} ({}); {}", address_, cause_of(problem.what()),
                             dialer_ ? dialer_->advice(problem.what()) : "it has stopped"));
 }
 

@@ -269,8 +269,9 @@ void search_limit(Context& context, const LoadOrder& order, double target_s) {
                  fmt::format("{}\n{} hold {:g} frames/s with 99 % within {}\n", table.text(),
                              count_of(limit, "session"), order.rate_per_s, seconds_text(target_s)));
   if (limit == 0) {
-    throw Problem(Exit::kRefused, "FAILED_PRECONDITION", "LOAD_FAILED",
-                  "not even one session holds");
+    throw Problem(
+        Exit::kRefused, "FAILED_PRECONDITION", "LOAD_FAILED",
+        "not even one session holds; give a longer --target, a lower --rate or a smaller --scene");
   }
 }
 

@@ -64,7 +64,10 @@ v1::Frame RecordingReader::read(std::int64_t number) {
   const bool sound = row.integer(2) == checksum_of_frame(header_.uid(), number, bytes) &&
                      frame.ParseFromString(bytes) && frame.number() == number &&
                      frame.time_s() == row.real(0);
-  if (!sound) throw damaged(path_, fmt::format("the checksum of frame {} is wrong", number));
+  if (!sound)
+    throw damaged(
+        path_,
+        fmt::format("the checksum of frame {} is wrong; weft cut takes out sound ones", number));
   if (!is_whole(frame, header_))
     throw damaged(path_, fmt::format("frame {} is not as long as its header says", number));
   return frame;

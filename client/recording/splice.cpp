@@ -73,7 +73,7 @@ FrameRange splice(std::vector<RecordingReader>& recordings, const SpliceOrder& o
   FrameRange range = order.frames;
   order_by_frames(recordings, range);
   if (!order.replace && std::filesystem::exists(order.path))
-    throw unwritable(order.path, "the file exists");
+    throw unwritable(order.path, "the file exists; --force replaces it");
 
   v1::StreamHeader header = recordings.front().header();
   header.set_start_frame(range.first);

@@ -16,7 +16,8 @@ constexpr std::chrono::milliseconds kCommitInterval{500};
 constexpr std::size_t kCommitBytes = 32 << 20;
 
 Database create(const std::string& path, bool replace) {
-  if (!replace && std::filesystem::exists(path)) throw unwritable(path, "the file exists");
+  if (!replace && std::filesystem::exists(path))
+    throw unwritable(path, "the file exists; --force replaces it");
   for (const char* suffix : {"", "-journal"}) std::filesystem::remove(path + suffix);
   Database database(path, Database::Access::kCreate);
   // a rollback journal, and no page written before its commit: the file alone is a whole recording

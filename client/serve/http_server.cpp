@@ -212,7 +212,8 @@ HttpServer::HttpServer(const std::string& host, std::uint16_t port, HttpHandlers
     : listener_(std::make_unique<Listener>(endpoint_of(host, port), std::move(handlers))) {
 } catch (const boost::system::system_error& error) {
   throw Problem(Exit::kRefused, "UNAVAILABLE", "ADDRESS_UNUSABLE",
-                fmt::format("cannot listen on {}:{}: {}", host, port, error.code().message()));
+                fmt::format("cannot listen on {}:{}: {}; choose another --http", host, port,
+                            error.code().message()));
 }
 
 HttpServer::~HttpServer() = default;

@@ -82,8 +82,9 @@ std::variant<Caller, grpc::Status> Access::caller(const grpc::ServerContextBase&
     if (value.starts_with(kScheme)) return find(value.substr(kScheme.size()));
   }
   if (!by_certificate_)
-    return errors::unauthenticated("TOKEN_MISSING",
-                                   "the call has no token; send \"authorization: Bearer TOKEN\"");
+    return errors::unauthenticated(
+        "TOKEN_MISSING",
+        "the call has no token; send \"authorization: Bearer TOKEN\" (weft --token-file)");
   if (const auto name = name_in(*context.auth_context())) return caller_called(*name);
   return errors::unauthenticated("CERTIFICATE_NAMELESS", "the client's certificate names nobody");
 }
@@ -95,7 +96,8 @@ std::variant<Caller, grpc::Status> Access::find(std::string_view token) const {
   for (const Token& known : tokens_)  // all of them, so that the time tells nothing
     if (CRYPTO_memcmp(known.hash.data(), hash.data(), hash.size()) == 0) found = &known;
   if (found != nullptr) return caller_called(found->principal);
-  return errors::unauthenticated("TOKEN_UNKNOWN", "the server does not know this token");
+  return errors::unauthenticated(
+      "TOKEN_UNKNOWN", "the server does not know this token; weftd --tokens has those it knows");
 }
 
 }  // namespace weft

@@ -209,7 +209,8 @@ MeasuredTextile Reader::preset(const std::string& name, const std::string& field
   } else {
     std::string lacking;
     for (const auto& value : preset->missing()) lacking += (lacking.empty() ? "" : ", ") + value;
-    problem(field + ".preset", "preset \"" + name + "\" is incomplete: no source gives " + lacking);
+    problem(field + ".preset", "preset \"" + name + "\" is incomplete: no source gives " + lacking +
+                                   "; take another, or give all values in measured");
   }
   stand_ins_.push_back(field + ".measured.");
   return {};

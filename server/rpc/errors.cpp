@@ -125,7 +125,8 @@ grpc::Status message_malformed(const std::string& type) {
 
 grpc::Status session_not_found(const std::string& name) {
   auto status =
-      make(grpc::StatusCode::NOT_FOUND, "SESSION_NOT_FOUND", "there is no session " + name);
+      make(grpc::StatusCode::NOT_FOUND, "SESSION_NOT_FOUND",
+           "there is no session " + name + "; ListSessions (weft session list) names them all");
   add_resource(status, "Session", name);
   return to_grpc(status);
 }
@@ -152,8 +153,9 @@ grpc::Status session_damaged(const std::string& name, const std::string& why) {
 }
 
 grpc::Status snapshot_not_found(const std::string& name) {
-  auto status = make(grpc::StatusCode::NOT_FOUND, "SNAPSHOT_NOT_FOUND",
-                     "there is no snapshot " + name + "; ListSnapshots names them all");
+  auto status = make(
+      grpc::StatusCode::NOT_FOUND, "SNAPSHOT_NOT_FOUND",
+      "there is no snapshot " + name + "; ListSnapshots (weft session snapshots) names them all");
   add_resource(status, "Snapshot", name);
   return to_grpc(status);
 }
@@ -172,8 +174,9 @@ grpc::Status snapshot_damaged(const std::string& name, const std::string& why) {
 }
 
 grpc::Status textile_not_found(const std::string& name) {
-  auto status = make(grpc::StatusCode::NOT_FOUND, "TEXTILE_NOT_FOUND",
-                     "there is no textile " + name + "; ListTextiles names them all");
+  auto status =
+      make(grpc::StatusCode::NOT_FOUND, "TEXTILE_NOT_FOUND",
+           "there is no textile " + name + "; ListTextiles (weft textile list) names them all");
   add_resource(status, "Textile", name);
   return to_grpc(status);
 }

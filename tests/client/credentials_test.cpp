@@ -66,7 +66,8 @@ TEST_F(CredentialsTest, ThatAreWrongAreSaidToBe) {
   const std::vector<std::string> list = {"session", "list"};
   const Outcome unknown = weft(list, ours_.certificate(), "mallory");
   EXPECT_EQ(unknown.exit, 1);
-  EXPECT_EQ(unknown.err, "weft: the server does not know this token\n");
+  EXPECT_EQ(unknown.err,
+            "weft: the server does not know this token; weftd --tokens has those it knows\n");
   const Outcome none = weft(list, ours_.certificate(), "");
   EXPECT_EQ(none.exit, 1);
   EXPECT_THAT(none.err, HasSubstr("the call has no token"));

@@ -327,7 +327,8 @@ TEST_F(ServeTest, ARecordingThatFailsSaysWhy) {
     listed = call("/recordings/list", Json::object())["recordings"][0];
   } while (listed["state"] == "recording");
   EXPECT_EQ(listed["state"], "failed");
-  EXPECT_EQ(listed["message"], "there is no session sessions/none");
+  EXPECT_EQ(listed["message"],
+            "there is no session sessions/none; ListSessions (weft session list) names them all");
   EXPECT_EQ(post("/recordings/start", R"({"session": "sessions/../up"})").result_int(), 400);
   EXPECT_EQ(post("/recordings/start", "{}").result_int(), 400);
 }

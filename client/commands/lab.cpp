@@ -23,6 +23,7 @@ struct LabOptions {
   v1::Evaluator evaluator = v1::EVALUATOR_UNSPECIFIED;
   std::optional<int> segments;
   bool fold_clamp = false;
+  bool optimal_breakpoints = false;
   bool no_diagonals = false;
   std::vector<double> spacings_mm;
   std::string csv, svg;
@@ -43,6 +44,7 @@ v1::RunTestRequest request_of(const LabOptions& options) {
     law->set_evaluator(options.evaluator);
     if (options.segments) law->set_segments(*options.segments);
     law->set_fold_clamp(options.fold_clamp);
+    law->set_optimal_breakpoints(options.optimal_breakpoints);
     law->set_diagonal_bend(!options.no_diagonals);
   }
   request.set_direction(options.direction == "weft" ? v1::LAB_DIRECTION_WEFT
@@ -220,6 +222,8 @@ void add_bending_options(CLI::App& command, LabOptions& options) {
       ->type_name("N")
       ->check(CLI::Range(1, 65536));
   command.add_flag("--fold-clamp", options.fold_clamp, "Linearize the clamped function (eq. 5)");
+  command.add_flag("--optimal-breakpoints", options.optimal_breakpoints,
+                   "Shorter segments where the curve bends more");
   command.add_flag("--no-diagonals", options.no_diagonals, "No diagonal bend connections");
 }
 

@@ -85,6 +85,8 @@ void add_new(CLI::App& scene, Context& context) {
       ->type_name("N")
       ->check(CLI::Range(1, 65536));
   command->add_flag("--fold-clamp", values.fold_clamp, "Linearize the clamped function (eq. 5)");
+  command->add_flag("--optimal-breakpoints", values.optimal_breakpoints,
+                    "Shorter segments where the law bends more");
   command->add_option("--accuracy", values.accuracy, "How close to the equations, and how fast")
       ->transform(one_of(accuracies))
       ->option_text("draft|standard|fine");

@@ -33,7 +33,8 @@ std::string bending_text(const v1::BendingLaw& bending) {
       return fmt::format("polynomial of degree {}", law.degree());
     default:
       return count_of(law.segments(), "line segment") +
-             (law.fold_clamp() ? ", clamp folded in" : "");
+             (law.fold_clamp() ? ", clamp folded in" : "") +
+             (law.optimal_breakpoints() ? ", optimal breakpoints" : "");
   }
 }
 

@@ -267,11 +267,12 @@ class ScriptReader {
     options.bend = fields.number("bend", 0, 1e5);
     options.segments = count("segments", 65536);
     options.fold_clamp = fields.flag("fold_clamp").value_or(false);
+    options.optimal_breakpoints = fields.flag("optimal_breakpoints").value_or(false);
     options.evaluator = read_choice("evaluator", kEvaluators, fields);
     options.accuracy = read_choice("accuracy", kAccuracies, fields);
     if (fields.has("scene")) {
       for (const char* key : {"rows", "columns", "spacing_m", "textile", "bend", "segments",
-                              "fold_clamp", "evaluator", "accuracy"}) {
+                              "fold_clamp", "optimal_breakpoints", "evaluator", "accuracy"}) {
         if (fields.has(key)) fields.fault(key, "is for a template; use fields with a scene");
       }
     }

@@ -41,11 +41,12 @@ v1::Sheet* add_sheet(v1::Scene& scene, const SheetDefaults& defaults,
   const bool linearized = !options.evaluator || *options.evaluator == v1::EVALUATOR_LINEARIZED;
   const std::optional<int> segments =
       options.segments || !linearized ? options.segments : defaults.segments;
-  if (options.evaluator || segments || options.fold_clamp) {
+  if (options.evaluator || segments || options.fold_clamp || options.optimal_breakpoints) {
     v1::ChoiKo* law = sheet->mutable_bending()->mutable_choi_ko();
     law->set_evaluator(options.evaluator.value_or(v1::EVALUATOR_LINEARIZED));
     if (segments) law->set_segments(*segments);
     law->set_fold_clamp(options.fold_clamp);
+    law->set_optimal_breakpoints(options.optimal_breakpoints);
   }
   return sheet;
 }

@@ -19,6 +19,7 @@ struct TemplateOptions {
   std::optional<v1::Evaluator> evaluator{};
   std::optional<int> segments{};  // of LINEARIZED
   bool fold_clamp = false;        // LINEARIZED samples eq. 5
+  bool optimal_breakpoints = false;
   std::optional<v1::Accuracy> accuracy{};
 };
 

@@ -76,41 +76,59 @@ double SeriesBending::integral(double r) const {
   return quadrature([this](double at) { return value(at); }, 1, r);
 }
 
-LinearizedBending::LinearizedBending(int segments, std::optional<double> clamp)
-    : segments_(static_cast<std::size_t>(segments)) {
+namespace {
+
+double place(const Breakpoints& b, double r) {
+  return r * (b[0] + r * (b[1] + r * (b[2] + r * b[3])));
+}
+
+// place() solved for r.
+double breakpoint(const Breakpoints& b, double at) {
+  double r = at;
+  for (int iteration = 0; iteration < 10; ++iteration)
+    r -= (place(b, r) - at) / (b[0] + r * (2 * b[1] + r * (3 * b[2] + r * 4 * b[3])));
+  return r;
+}
+
+}  // namespace
+
+LinearizedBending::LinearizedBending(int segments, std::optional<double> clamp,
+                                     const Breakpoints& breakpoints)
+    : breakpoints_(breakpoints), segments_(static_cast<std::size_t>(segments)) {
   const ExactBending exact;
-  const auto node = [&](int i) {
-    const double r = static_cast<double>(i) / segments;
+  const auto node = [&](double r) {
     const double g = exact.value(r);
     return clamp ? std::max(g, *clamp * (r - 1)) : g;
   };
-  double upper = node(segments), integral = 0;
+  double end = 1, upper = node(end), integral = 0;
   for (int i = segments - 1; i >= 0; --i) {
-    const double lower = node(i);
+    const double begin = breakpoint(breakpoints, static_cast<double>(i) / segments);
+    const double lower = node(begin);
     Segment& segment = segments_[static_cast<std::size_t>(i)];
-    segment.slope = (upper - lower) * segments;
-    segment.intercept = lower - segment.slope * i / segments;
+    segment.slope = (upper - lower) / (end - begin);
+    segment.intercept = lower - segment.slope * begin;
+    segment.end = end;
     segment.integral = integral;
-    integral -= (lower + upper) / (2.0 * segments);
+    integral -= (lower + upper) / 2 * (end - begin);
+    end = begin;
     upper = lower;
   }
 }
 
-int LinearizedBending::index(double r) const {
-  const int last = static_cast<int>(segments_.size()) - 1;
-  return std::min(static_cast<int>(r * static_cast<double>(segments_.size())), last);
+const LinearizedBending::Segment& LinearizedBending::segment(double r) const {
+  const auto size = static_cast<double>(segments_.size());
+  const auto i = static_cast<std::size_t>(place(breakpoints_, r) * size);
+  return segments_[std::min(i, segments_.size() - 1)];
 }
 
 double LinearizedBending::value(double r) const {
-  const Segment& segment = segments_[static_cast<std::size_t>(index(r))];
-  return segment.intercept + segment.slope * r;
+  const Segment& at = segment(r);
+  return at.intercept + at.slope * r;
 }
 
 double LinearizedBending::integral(double r) const {
-  const int i = index(r);
-  const Segment& segment = segments_[static_cast<std::size_t>(i)];
-  const double upper = (i + 1.0) / static_cast<double>(segments_.size());
-  return segment.integral - (upper - r) * (segment.intercept + segment.slope * (upper + r) / 2);
+  const Segment& at = segment(r);
+  return at.integral - (at.end - r) * (at.intercept + at.slope * (at.end + r) / 2);
 }
 
 PolynomialBending::PolynomialBending(int degree) {
@@ -172,7 +190,9 @@ BendingFunction make_function(const ChoiKo& law, double clamp) {
     case Evaluator::kLinearized:
       break;
   }
-  return law.fold_clamp ? LinearizedBending(law.segments, clamp) : LinearizedBending(law.segments);
+  if (law.fold_clamp) return LinearizedBending(law.segments, clamp);
+  return LinearizedBending(law.segments, std::nullopt,
+                           law.optimal_breakpoints ? kOptimalBreakpoints : kEqualBreakpoints);
 }
 
 // The range of r in which g lies above the clamp. g(r) - clamp (r - 1) is concave and negative at

@@ -41,23 +41,34 @@ class SeriesBending {
       2.0};
 };
 
-// Equal line segments over [0, 1], the paper's contribution. Between the nodes |g| is
-// overestimated.
+// Where breakpoints lie: w(r) = i / segments, w = r (b0 + r (b1 + r (b2 + r b3))), which rises from
+// 0 to 1. No segment has to be searched for.
+using Breakpoints = std::array<double, 4>;
+inline constexpr Breakpoints kEqualBreakpoints = {1};
+// A chord of width h is off by h^2 / 8 g'' / g: of all such w the one whose slope is the least
+// below sqrt(g'' / g), where all segments would be as good as each other. The largest relative
+// error is at most an eighth above the smallest that so many segments can have.
+inline constexpr Breakpoints kOptimalBreakpoints = {2.420325, -3.230788, 2.73076, -0.920297};
+
+// Line segments over [0, 1], the paper's contribution. Between the nodes |g| is overestimated.
 class LinearizedBending {
  public:
   // With a clamp = c_b L^3 / k_b the nodes sample max(g(r), clamp (r - 1)) (fold_clamp, eq. 5).
-  explicit LinearizedBending(int segments, std::optional<double> clamp = std::nullopt);
+  explicit LinearizedBending(int segments, std::optional<double> clamp = std::nullopt,
+                             const Breakpoints& breakpoints = kEqualBreakpoints);
   double value(double r) const;
   double integral(double r) const;
 
-  // g(r) = intercept + slope r, for r from segment / segments.
+  // g(r) = intercept + slope r, for r up to end.
   struct Segment {
-    double intercept, slope, integral;  // integral of g from 1 to the segment's upper end
+    double intercept, slope, end, integral;  // integral of g from 1 to end
   };
   const std::vector<Segment>& segments() const { return segments_; }
+  const Breakpoints& breakpoints() const { return breakpoints_; }
 
  private:
-  int index(double r) const;
+  const Segment& segment(double r) const;
+  Breakpoints breakpoints_;
   std::vector<Segment> segments_;
 };
 

@@ -133,9 +133,13 @@ void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& 
   if (const auto* law = std::get_if<ChoiKo>(&sheet.bending)) {
     check.number(field + ".bending.choi_ko.segments", law->segments, 1, 65536, "");
     check.number(field + ".bending.choi_ko.degree", law->degree, 1, 24, "");
-    if (law->fold_clamp && law->evaluator != Evaluator::kLinearized)
+    const bool linearized = law->evaluator == Evaluator::kLinearized;
+    if (law->fold_clamp && !linearized)
       check.problem(field + ".bending.choi_ko.fold_clamp",
                     "true is for the evaluator LINEARIZED only");
+    if (law->optimal_breakpoints && (!linearized || law->fold_clamp))
+      check.problem(field + ".bending.choi_ko.optimal_breakpoints",
+                    "true is for the evaluator LINEARIZED without fold_clamp only");
   }
   check.position(field + ".placement.origin_m", sheet.origin);
   check.rotation(field + ".placement.rotation", sheet.rotation);

@@ -37,9 +37,10 @@ enum class Evaluator { kSeries, kExact, kLinearized, kPolynomial };
 
 struct ChoiKo {
   Evaluator evaluator = Evaluator::kLinearized;
-  int segments = 32;        // of kLinearized
-  int degree = 8;           // of kPolynomial
-  bool fold_clamp = false;  // kLinearized samples eq. 5
+  int segments = 32;                 // of kLinearized
+  int degree = 8;                    // of kPolynomial
+  bool fold_clamp = false;           // kLinearized samples eq. 5
+  bool optimal_breakpoints = false;  // of kLinearized: closer where f_b bends more
   bool diagonal_bend = true;
 };
 

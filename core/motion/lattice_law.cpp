@@ -20,13 +20,15 @@ BendLaw<T> bend_law(const BendingForce& force, int terms, double share) {
   law.intercepts = AlignedArray<T>(size);
   law.slopes = AlignedArray<T>(size);
   if (const auto* line = std::get_if<LinearizedBending>(&force.function())) {
-    law.to_index = static_cast<T>(terms / length);
+    double to_index = terms;
+    for (std::size_t k = 0; k < law.to_index.size(); ++k)
+      law.to_index[k] = static_cast<T>((to_index /= length) * line->breakpoints()[k]);
     for (std::size_t i = 0; i < line->segments().size(); ++i) {
       law.intercepts.data()[i] = static_cast<T>(scale * line->segments()[i].intercept);
       law.slopes.data()[i] = static_cast<T>(scale / length * line->segments()[i].slope);
     }
   } else {
-    law.to_index = static_cast<T>(2 / length);
+    law.to_index[0] = static_cast<T>(2 / length);
     const auto& coefficients = std::get<PolynomialBending>(force.function()).coefficients();
     for (std::size_t i = 0; i < coefficients.size(); ++i)
       law.intercepts.data()[i] = static_cast<T>(scale * coefficients[i]);
@@ -74,9 +76,10 @@ void set_bending(const SheetDefinition& sheet, const LatticeConstants& k, SweepL
   if (law.bend_diagonal)
     law.diagonal = make(k.bend_diagonal, k.clamp_diagonal, h * std::hypot(2, 2));
   if (!bends) return;
-  law.bend = !table            ? BendKind::kPolynomial
-             : law.terms <= 32 ? BendKind::kTable32
-                               : BendKind::kTable;
+  law.bend = !table                         ? BendKind::kPolynomial
+             : law.terms > 32               ? BendKind::kTable
+             : choi_ko->optimal_breakpoints ? BendKind::kOptimalTable32
+                                            : BendKind::kTable32;
 }
 
 template <class T>

@@ -509,6 +509,8 @@ T sweep_lattice(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band
                       : sweep_as<BendKind::kTable32, false, true>(law, state, band);
       return shears ? sweep_as<BendKind::kTable32, true, false>(law, state, band)
                     : sweep_as<BendKind::kTable32, false, false>(law, state, band);
+    case BendKind::kOptimalTable32:
+      return sweep_as<BendKind::kOptimalTable32, true, true>(law, state, band);
     case BendKind::kTable:
       return sweep_as<BendKind::kTable, true, true>(law, state, band);
     case BendKind::kPolynomial:

@@ -65,8 +65,9 @@ template <class T>
 struct BendLaw {
   T clamp = 0;       // c_b, N/m; 0: no force
   T clamp_rest = 0;  // c_b L, N
-  T to_index = 0;    // segments / L, or 2 / L of a polynomial in 2 r - 1, 1/m
-  T last = 0;        // the last segment
+  // l (t0 + l (t1 + ...)): the segment that l lies in; or t0 = 2 / L of a polynomial in 2 r - 1
+  std::array<T, 4> to_index{};
+  T last = 0;  // the last segment
   // f_b = intercept + slope l of each segment (N, N/m), 32 at least, or the polynomial's
   // coefficients, highest power first (N)
   AlignedArray<T> intercepts, slopes;
@@ -82,7 +83,14 @@ struct WindLaw {
   T drag = 0;                   // c_t / 6, kg/(m^2 s)
 };
 
-enum class BendKind { kNone, kTable32, kTable, kPolynomial, kIsometric };
+enum class BendKind {
+  kNone,
+  kTable32,
+  kOptimalTable32,  // at optimal breakpoints
+  kTable,           // of more segments, at any
+  kPolynomial,
+  kIsometric
+};
 
 // What the columns of a vector differ in.
 enum ColumnPlane {

@@ -137,6 +137,17 @@ HWY_INLINE V look_up(D d, const hn::TFromD<D>* table, I i) {
   return hn::Load(d, values);
 }
 
+// Where in its table or polynomial a length lies.
+template <BendKind kKind, class D, class V = hn::Vec<D>>
+HWY_INLINE V place(D d, const BendLaw<hn::TFromD<D>>& law, V l) {
+  const auto& t = law.to_index;
+  if constexpr (kKind == BendKind::kTable32 || kKind == BendKind::kPolynomial)
+    return hn::Mul(l, hn::Set(d, t[0]));
+  V sum = hn::MulAdd(l, hn::Set(d, t[3]), hn::Set(d, t[2]));
+  sum = hn::MulAdd(l, sum, hn::Set(d, t[1]));
+  return hn::Mul(l, hn::MulAdd(l, sum, hn::Set(d, t[0])));
+}
+
 // intercept / l + slope of the segment that `at` lies in. A table of 32 repeats itself: a length
 // beyond it pulls at nothing. Where registers hold it, it is looked up there.
 template <BendKind kKind, class D, class V = hn::Vec<D>>
@@ -144,15 +155,16 @@ HWY_INLINE V line(D d, const BendLaw<hn::TFromD<D>>& law, V at, V y) {
   using T = hn::TFromD<D>;
   const T* const a = law.intercepts.data();
   const T* const b = law.slopes.data();
+  constexpr bool k32 = kKind == BendKind::kTable32 || kKind == BendKind::kOptimalTable32;
 #if HWY_TARGET == HWY_AVX3
-  if constexpr (kKind == BendKind::kTable32 && sizeof(T) == 4) {
+  if constexpr (k32 && sizeof(T) == 4) {
     const __m512i i = _mm512_cvttps_epi32(at.raw);
     const auto pick = [&](const T* table) HWY_ATTR {
       return V{_mm512_permutex2var_ps(hn::Load(d, table).raw, i, hn::Load(d, table + 16).raw)};
     };
     return hn::MulAdd(pick(a), y, pick(b));
   }
-  if constexpr (kKind == BendKind::kTable32 && sizeof(T) == 8) {
+  if constexpr (k32 && sizeof(T) == 8) {
     const __m512i i = _mm512_cvttpd_epi64(at.raw);
     const __mmask8 upper = _mm512_test_epi64_mask(i, _mm512_set1_epi64(16));
     const auto pick = [&](const T* table) HWY_ATTR {
@@ -165,7 +177,7 @@ HWY_INLINE V line(D d, const BendLaw<hn::TFromD<D>>& law, V at, V y) {
   }
 #endif
 #if HWY_TARGET == HWY_AVX2
-  if constexpr (kKind == BendKind::kTable32 && sizeof(T) == 4) {
+  if constexpr (k32 && sizeof(T) == 4) {
     const __m256i i = _mm256_cvttps_epi32(at.raw);
     const __m256 bit3 = _mm256_castsi256_ps(_mm256_slli_epi32(i, 28));
     const __m256 bit4 = _mm256_castsi256_ps(_mm256_slli_epi32(i, 27));
@@ -182,11 +194,12 @@ HWY_INLINE V line(D d, const BendLaw<hn::TFromD<D>>& law, V at, V y) {
 #endif
   const hn::RebindToSigned<D> di;
   auto i = hn::Zero(di);
-  if constexpr (kKind == BendKind::kTable32) {
+  if constexpr (k32) {
     i = hn::And(hn::ConvertTo(di, at), hn::Set(di, 31));
   } else {
     const V last = hn::Set(d, law.last);
-    i = hn::ConvertTo(di, hn::IfThenElse(hn::Lt(at, last), at, last));  // NaN: the last
+    at = hn::IfThenElse(hn::Lt(at, last), at, last);  // NaN: the last
+    i = hn::ConvertTo(di, hn::Max(at, hn::Zero(d)));
   }
   return hn::MulAdd(look_up(d, a, i), y, look_up(d, b, i));
 }
@@ -204,7 +217,7 @@ HWY_INLINE V polynomial(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V at)
 // max(f_b, c_b (l - L)) / l where negative, N/m (eq. 3 to 5); y = 1 / l.
 template <BendKind kKind, class D, class V = hn::Vec<D>>
 HWY_INLINE V bend(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V l2, V y) {
-  const V at = hn::Mul(hn::Mul(l2, y), hn::Set(d, law.to_index));
+  const V at = place<kKind>(d, law, hn::Mul(l2, y));
   V f = hn::Zero(d);
   if constexpr (kKind == BendKind::kPolynomial)
     f = hn::Mul(polynomial(d, law, terms, at), y);

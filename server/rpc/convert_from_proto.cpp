@@ -155,6 +155,7 @@ BendingLaw Reader::bending(const v1::BendingLaw& from, const std::string& field)
   if (law.has_degree()) choi_ko.degree = law.degree();
   choi_ko.fold_clamp = law.fold_clamp();
   if (law.has_diagonal_bend()) choi_ko.diagonal_bend = law.diagonal_bend();
+  choi_ko.optimal_breakpoints = law.optimal_breakpoints();
   return choi_ko;
 }
 

@@ -56,6 +56,7 @@ void set(v1::BendingLaw* to, const ChoiKo& from) {
   law->set_degree(from.degree);
   law->set_fold_clamp(from.fold_clamp);
   law->set_diagonal_bend(from.diagonal_bend);
+  law->set_optimal_breakpoints(from.optimal_breakpoints);
 }
 
 void set(v1::BendingLaw* to, const Isometric& from) {

@@ -76,6 +76,9 @@ const bool added = [] {
   add("EXACT", ExactBending());
   for (const int segments : {2, 5, 16, 32, 60, 256, 1024})
     add("LINEARIZED/" + std::to_string(segments), LinearizedBending(segments));
+  for (const int segments : {2, 5, 16, 32, 60})
+    add("OPTIMAL/" + std::to_string(segments),
+        LinearizedBending(segments, std::nullopt, kOptimalBreakpoints));
   for (const int segments : {5, 32, 60})
     add("SEARCHED/" + std::to_string(segments), SearchedBending(segments));
   for (const int degree : {5, 7, 10})

@@ -33,13 +33,12 @@ void map(const float* r, float* g, std::size_t n, const F& f) {
 template <BendKind kKind>
 void segments(const BendLaw<float>& law, int, const float* r, float* g, std::size_t n) {
   const D d;
-  map(r, g, n,
-      [&](V v) HWY_ATTR { return line<kKind>(d, law, hn::Mul(v, hn::Set(d, law.to_index)), v); });
+  map(r, g, n, [&](V v) HWY_ATTR { return line<kKind>(d, law, place<kKind>(d, law, v), v); });
 }
 void chebyshev(const BendLaw<float>& law, int terms, const float* r, float* g, std::size_t n) {
   const D d;
   map(r, g, n, [&](V v) HWY_ATTR {
-    return polynomial(d, law, terms, hn::Mul(v, hn::Set(d, law.to_index)));
+    return polynomial(d, law, terms, place<BendKind::kPolynomial>(d, law, v));
   });
 }
 // Eq. 6 in vectors, Horner in 1 - r; law.intercepts: the series' coefficients, highest first.
@@ -56,6 +55,9 @@ void series(const BendLaw<float>& law, int terms, const float* r, float* g, std:
 void segments32(const BendLaw<float>& law, int terms, const float* r, float* g, std::size_t n) {
   segments<BendKind::kTable32>(law, terms, r, g, n);
 }
+void optimal32(const BendLaw<float>& law, int terms, const float* r, float* g, std::size_t n) {
+  segments<BendKind::kOptimalTable32>(law, terms, r, g, n);
+}
 void segments_more(const BendLaw<float>& law, int terms, const float* r, float* g, std::size_t n) {
   segments<BendKind::kTable>(law, terms, r, g, n);
 }
@@ -67,6 +69,7 @@ HWY_AFTER_NAMESPACE();
 namespace weft {
 
 HWY_EXPORT(segments32);
+HWY_EXPORT(optimal32);
 HWY_EXPORT(segments_more);
 HWY_EXPORT(chebyshev);
 HWY_EXPORT(series);
@@ -121,7 +124,7 @@ void evaluate_hung(benchmark::State& state, const Dispatch& dispatch, const Bend
 
 template <class Dispatch>
 void add(const std::string& name, const Dispatch& dispatch, const std::vector<double>& intercepts,
-         const std::vector<double>& slopes, double to_index) {
+         const std::vector<double>& slopes, const std::array<float, 4>& to_index) {
   const auto with_law = [=](const auto& run) {
     BendLaw<float> law;
     const auto fill = [](const std::vector<double>& from, AlignedArray<float>& to) {
@@ -131,7 +134,7 @@ void add(const std::string& name, const Dispatch& dispatch, const std::vector<do
     };
     fill(intercepts, law.intercepts);
     fill(slopes, law.slopes);
-    law.to_index = static_cast<float>(to_index);
+    law.to_index = to_index;
     law.last = static_cast<float>(intercepts.size() - 1);
     run(law, static_cast<int>(intercepts.size()));
   };
@@ -145,30 +148,37 @@ void add(const std::string& name, const Dispatch& dispatch, const std::vector<do
 }
 
 const bool added = [] {
-  for (const int n : {2, 5, 16, 32, 60, 256, 1024}) {
+  const auto add_table = [](const std::string& name, int n, const Breakpoints& breakpoints,
+                            Function (*registers)()) {
     std::vector<double> intercepts, slopes;
-    const LinearizedBending linearized(n);
+    const LinearizedBending linearized(n, std::nullopt, breakpoints);
     for (const auto& segment : linearized.segments()) {
       intercepts.push_back(segment.intercept);
       slopes.push_back(segment.slope);
     }
+    std::array<float, 4> to_index{};
+    for (std::size_t k = 0; k < to_index.size(); ++k)
+      to_index[k] = static_cast<float>(n * breakpoints[k]);
     add(
-        "LINEARIZED/" + std::to_string(n),
-        [n]() -> Function {
-          if (n <= 32) return HWY_DYNAMIC_DISPATCH(segments32);
-          return HWY_DYNAMIC_DISPATCH(segments_more);
+        name + std::to_string(n),
+        [n, registers]() -> Function {
+          return n <= 32 ? registers() : HWY_DYNAMIC_DISPATCH(segments_more);
         },
-        slopes, intercepts, n);
-  }
+        slopes, intercepts, to_index);
+  };
+  for (const int n : {2, 5, 16, 32, 60, 256, 1024})
+    add_table("LINEARIZED/", n, kEqualBreakpoints,
+              []() -> Function { return HWY_DYNAMIC_DISPATCH(segments32); });
+  for (const int n : {2, 5, 16, 32, 60})
+    add_table("OPTIMAL/", n, kOptimalBreakpoints,
+              []() -> Function { return HWY_DYNAMIC_DISPATCH(optimal32); });
   for (const int degree : {5, 7, 10})
-    add(
-        "POLYNOMIAL/" + std::to_string(degree),
+    add("POLYNOMIAL/" + std::to_string(degree),
         []() -> Function { return HWY_DYNAMIC_DISPATCH(chebyshev); },
-        PolynomialBending(degree).coefficients(), {}, 2);
+        PolynomialBending(degree).coefficients(), {}, {2});
   const auto& terms = SeriesBending::kCoefficients;
-  add(
-      "SERIES", []() -> Function { return HWY_DYNAMIC_DISPATCH(series); },
-      {terms.begin(), terms.end()}, {}, 1);
+  add("SERIES", []() -> Function { return HWY_DYNAMIC_DISPATCH(series); },
+      {terms.begin(), terms.end()}, {}, {});
   return true;
 }();
 

@@ -109,6 +109,10 @@ const bool added = [] {
     }
     add("substep/" + size + "/float/AVX-512/2", {.rows = rows, .target = HWY_AVX3, .threads = 2});
   }
+  add("substep/31x31/float/AVX-512/1/OPTIMAL",
+      {.target = HWY_AVX3, .law = {.optimal_breakpoints = true}});
+  add("substep/31x31/float/AVX2/1/OPTIMAL",
+      {.target = HWY_AVX2, .law = {.optimal_breakpoints = true}});
   for (const int rows : {31, 101}) {
     const std::string size = std::to_string(rows) + "x" + std::to_string(rows);
     const auto plain = [&](Evaluator evaluator, const char* law) {

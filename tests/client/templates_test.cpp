@@ -126,6 +126,8 @@ TEST(Templates, evaluate_the_paper_s_fourth_sheet_with_segments_or_exactly) {
   EXPECT_EQ(law({.segments = 2}).segments(), 2);
   EXPECT_EQ(law({.segments = 5, .fold_clamp = true}).segments(), 5);
   EXPECT_TRUE(law({.segments = 5, .fold_clamp = true}).fold_clamp());
+  EXPECT_FALSE(law({}).optimal_breakpoints());
+  EXPECT_TRUE(law({.optimal_breakpoints = true}).optimal_breakpoints());
   const v1::ChoiKo exact = law({.evaluator = v1::EVALUATOR_EXACT});
   EXPECT_EQ(exact.evaluator(), v1::EVALUATOR_EXACT);
   EXPECT_FALSE(exact.has_segments());

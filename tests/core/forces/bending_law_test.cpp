@@ -57,9 +57,56 @@ TEST(BendingLaw, LinearSegmentsHaveTheStatedErrors) {
   }
 }
 
+LinearizedBending optimal(int segments) {
+  return LinearizedBending(segments, std::nullopt, kOptimalBreakpoints);
+}
+
+TEST(BendingLaw, OptimalBreakpointsHaveTheStatedErrors) {
+  const std::vector<std::pair<int, double>> stated = {
+      {2, 0.111}, {5, 0.0184}, {16, 1.81e-3}, {32, 4.55e-4}, {60, 1.29e-4}};
+  for (const auto& [segments, error] : stated) {
+    const double found = largest_error(optimal(segments));
+    EXPECT_LT(found, error * 1.01) << segments << " segments";
+    EXPECT_GT(found, error * 0.9) << segments << " segments";
+  }
+}
+
+// How far chords of at most this relative error reach, laid one after the other from r = 0.
+double reach(int chords, double error) {
+  const ExactBending exact;
+  double begin = 0;
+  for (int i = 0; i < chords && begin < 1; ++i) {
+    const double g = exact.value(begin);
+    const auto keeps = [&](double end) {
+      const double slope = (exact.value(end) - g) / (end - begin);
+      for (double part = 0.02; part < 1; part += 0.02) {
+        const double r = begin + part * (end - begin);
+        if ((g + slope * (r - begin)) / exact.value(r) - 1 > error) return false;
+      }
+      return true;
+    };
+    if (keeps(1)) return 1;
+    double inside = begin, outside = 1;
+    for (int k = 0; k < 30; ++k) {
+      const double middle = (inside + outside) / 2;
+      (keeps(middle) ? inside : outside) = middle;
+    }
+    begin = inside;
+  }
+  return begin;
+}
+
+TEST(BendingLaw, NoBreakpointsAreMoreThanAnEighthBetterThanTheOptimalOnes) {
+  for (const int segments : {1, 2, 3, 5, 16, 32})
+    EXPECT_LT(reach(segments, largest_error(optimal(segments)) / 1.125), 1) << segments;
+  EXPECT_EQ(reach(32, largest_error(optimal(32))), 1);
+}
+
 TEST(BendingLaw, ChordsNeverUnderestimateTheForce) {
-  const LinearizedBending linearized(5);
-  for (const auto& [r, g] : samples()) EXPECT_LE(linearized.value(r), g + 1e-9) << r;
+  for (const auto& [r, g] : samples()) {
+    EXPECT_LE(LinearizedBending(5).value(r), g + 1e-9) << r;
+    EXPECT_LE(optimal(5).value(r), g + 1e-9) << r;
+  }
 }
 
 TEST(BendingLaw, APolynomialOfDegreeSixEightAndTenHasTheStatedErrors) {
@@ -113,6 +160,7 @@ TEST(BendingLaw, TheIntegralOfEveryEvaluatorHasItsValueAsSlope) {
   expect_integral_of_value(ExactBending());
   expect_integral_of_value(SeriesBending());
   expect_integral_of_value(LinearizedBending(7));
+  expect_integral_of_value(optimal(7));
   expect_integral_of_value(PolynomialBending(8));
 }
 
@@ -152,6 +200,7 @@ TEST(BendingLaw, TheForceIsTheSlopeOfItsEnergyForEveryEvaluator) {
        {Evaluator::kSeries, Evaluator::kExact, Evaluator::kLinearized, Evaluator::kPolynomial})
     laws.push_back({.evaluator = evaluator});
   laws.push_back({.evaluator = Evaluator::kLinearized, .segments = 3, .fold_clamp = true});
+  laws.push_back({.segments = 3, .optimal_breakpoints = true});
   for (const ChoiKo& law : laws) {
     for (const double k_b : {1e-4, 1.0 / 35, 1.0}) {
       const BendingForce bending(law, k_b, 1, 1);

@@ -37,6 +37,19 @@ TEST(Problems, EveryOneIsFoundAndNamesFieldValueAndBounds) {
   EXPECT_EQ(problems[2].field, "solver.frame_step_s");
 }
 
+TEST(Problems, OptimalBreakpointsAreForLineSegmentsOfTheUnclampedFunction) {
+  Scene scene = good();
+  const auto bad = [&](const ChoiKo& law) {
+    scene.sheets[0].bending = law;
+    return bad_fields(scene);
+  };
+  const std::string field = "sheets[0].bending.choi_ko.optimal_breakpoints";
+  EXPECT_THAT(bad({.optimal_breakpoints = true}), IsEmpty());
+  EXPECT_THAT(bad({.fold_clamp = true, .optimal_breakpoints = true}), ElementsAre(field));
+  EXPECT_THAT(bad({.evaluator = Evaluator::kExact, .optimal_breakpoints = true}),
+              ElementsAre(field));
+}
+
 TEST(Problems, StartPositionsMustBeAsManyAsTheParticlesNeedAndFinite) {
   Scene scene = good();
   scene.sheets[0].start_positions.assign(35, 0);

@@ -91,6 +91,8 @@ Textile measured(double shear, double drag, double damping) {
 }
 RawTextile& raw(SheetDefinition& sheet) { return std::get<RawTextile>(sheet.textile.model); }
 
+ChoiKo optimal(int segments) { return {.segments = segments, .optimal_breakpoints = true}; }
+
 const Feature kFeatures[] = {
     {"EverythingOn", [](SheetDefinition&) {}},
     {"NoDamping", [](SheetDefinition& s) { s.textile.damping = 0; }},
@@ -105,6 +107,14 @@ const Feature kFeatures[] = {
     {"Drag", [](SheetDefinition& s) { raw(s).air_drag = 0.02; }},
     {"TwoSegments", [](SheetDefinition& s) { s.bending = ChoiKo{.segments = 2}; }},
     {"SixtySegments", [](SheetDefinition& s) { s.bending = ChoiKo{.segments = 60}; }},
+    {"OptimalBreakpoints", [](SheetDefinition& s) { s.bending = optimal(32); }},
+    {"SixtySegmentsAtOptimalBreakpoints", [](SheetDefinition& s) { s.bending = optimal(60); }},
+    {"ThreeSegmentsAtOptimalBreakpointsNoDiagonalBendNoShear",
+     [](SheetDefinition& s) {
+       ChoiKo law = optimal(3);
+       law.diagonal_bend = false;
+       raw(s).shear = 0, s.bending = law;
+     }},
     {"SixtySegmentsNoDiagonalBendNoShear",
      [](SheetDefinition& s) {
        raw(s).shear = 0, s.bending = ChoiKo{.segments = 60, .diagonal_bend = false};

@@ -20,7 +20,7 @@ std::string sheet_path(std::size_t index) { return "sheets[" + std::to_string(in
 // centred, which no step is too long for.
 double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& mesh) {
   double rate = 0;
-  if (scene.solver.integrator != IntegratorKind::kVerlet)
+  if (scene.solver.integrator != IntegratorKind::kVerlet && mesh.drag.size() > 0)
     rate += mesh.drag.cwiseQuotient(mesh.mass).maxCoeff();
   if (scene.environment.wind) {
     const Wind& wind = *scene.environment.wind;
@@ -98,7 +98,7 @@ void describe_families(const SheetDefinition& sheet, const Mesh& mesh, Plan& pla
     plan.passes.push_back(join(sheet.name, ": damping"));
   else
     plan.skipped.push_back({join(sheet.name, ": damping"), "k_d is 0"});
-  if (mesh.drag.maxCoeff() > 0)
+  if (mesh.drag.size() > 0)
     plan.passes.push_back(join(sheet.name, ": drag"));
   else
     plan.skipped.push_back({join(sheet.name, ": drag"), "the textile has no air drag"});

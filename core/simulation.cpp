@@ -1,6 +1,7 @@
 #include "core/simulation.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <sstream>
@@ -17,12 +18,13 @@ namespace {
 
 // A sheet in motion.
 struct Sheet {
+  explicit Sheet(const SheetDefinition& definition) : start(definition) {}
+
+  StartPositions start;  // that paths are relative to
   Mesh mesh;
   Dynamics dynamics;  // the forces in double
   std::unique_ptr<SheetSolver> solver;
-  Matrix3Xd start;  // positions that paths are relative to, m
   SheetState good;  // at the end of the last frame
-  SheetState next;  // at the end of the one that is being computed
   double skin = 0;  // m
   double most_strain = kMostStrain;
   std::optional<TextileRamp> ramp;
@@ -33,6 +35,16 @@ struct Sheet {
     state.kinetic_energy = kinetic_energy(mesh, state.v);
   }
 };
+
+// Sheets at the end of the frame that is being computed.
+using NextStates = std::vector<SheetState>;
+
+// One for every thread that computes frames: between them no simulation needs its own.
+NextStates& next_states(std::size_t sheets) {
+  static thread_local NextStates states;
+  states.resize(sheets);
+  return states;
+}
 
 // What the guard says of an attempt at a frame.
 struct Attempt {
@@ -55,7 +67,7 @@ void lead_pins(const SheetDefinition& definition, double time, double dt, Sheet&
     const Vector3d offset = offset_at(pin.path, time);
     const Vector3d displacement = offset - offset_at(pin.path, time - dt);
     for (const int i : pin.particles) {
-      sheet.solver->lead(i, sheet.start.col(i) + offset, displacement);
+      sheet.solver->lead(i, sheet.start(i) + offset, displacement);
     }
   }
 }
@@ -70,8 +82,9 @@ VectorXd inverse_mass_of(const Mesh& mesh, const std::vector<Pin>& pins) {
 
 void set_textile_of(const Scene& scene, const SheetDefinition& definition, Sheet& sheet) {
   sheet.mesh = make_lattice(definition);
+  if (!scene.environment.wind) sheet.mesh.triangles = std::vector<std::array<int, 3>>();
   sheet.dynamics.inverse_mass = inverse_mass_of(sheet.mesh, definition.pins);
-  sheet.dynamics.drag = sheet.mesh.drag.maxCoeff() > 0 ? sheet.mesh.drag : VectorXd();
+  sheet.dynamics.drag = sheet.mesh.drag;
   sheet.dynamics.gravity = scene.environment.gravity;
   sheet.skin = definition.skin.value_or(definition.grid.spacing / 10);
 }
@@ -132,9 +145,9 @@ struct Simulation::State {
   bool change_textiles();
   void bind_forces();
   void step(double time, double dt, Crew& crew);
-  bool compute_frame(Crew& crew);
-  Attempt attempt(Crew& crew);
-  bool quiet() const;
+  bool compute_frame(Crew& crew, NextStates& next);
+  Attempt attempt(Crew& crew, NextStates& next);
+  bool quiet(const NextStates& next) const;
   void set_halvings(int count);
   Handling handling() const;
   Moment moment() const;
@@ -192,13 +205,13 @@ void Simulation::State::bind_forces() {
 Simulation::State::State(Scene given, SolverFactory factory)
     : scene(std::move(given)),
       make_solver(std::move(factory)),
-      sheets(scene.sheets.size()),
+      sheets(scene.sheets.begin(), scene.sheets.end()),
       rest_after(end_of_paths(scene)) {
   std::vector<Matrix3Xd> x(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const SheetDefinition definition = stepped(s);
     set_textile_of(scene, definition, sheets[s]);
-    sheets[s].start = x[s] = start_positions(definition);
+    x[s] = start_positions(definition);
     for (const Pin& pin : definition.pins)
       for (const int i : pin.particles) x[s].col(i) += offset_at(pin.path, 0);
   }
@@ -261,7 +274,7 @@ void Simulation::State::adopt(Handling handling) {
 }
 
 Moment Simulation::State::moment() const {
-  return {scene, time(), [this](std::size_t s, int i) { return sheets[s].start.col(i); },
+  return {scene, time(), [this](std::size_t s, int i) { return sheets[s].start(i); },
           [this](std::size_t s, int i) { return sheets[s].good.x.col(i); }};
 }
 
@@ -338,7 +351,7 @@ bool Simulation::State::change_textiles() {
 
 // Whether in the frame being computed kinetic energy and mean net forces, contact included, were
 // small. Net forces of one step would be as rough as positions are rounded.
-bool Simulation::State::quiet() const {
+bool Simulation::State::quiet(const NextStates& next) const {
   constexpr double kEnergyShare = 1e-6, kForceShare = 0.01;
   if (frame == 0 || time() + scene.solver.frame_step < rest_after) return false;
   const double given = scene.environment.gravity.norm();
@@ -348,7 +361,7 @@ bool Simulation::State::quiet() const {
     const Sheet& sheet = sheets[s];
     const Grid& grid = scene.sheets[s].grid;
     const double height = (std::max(grid.rows, grid.columns) - 1) * grid.spacing;
-    const Matrix3Xd &v = sheet.next.v, &before = sheet.good.v;
+    const Matrix3Xd &v = next[s].v, &before = sheet.good.v;
     double energy = 0;
     for (Eigen::Index i = 0; i < v.cols(); ++i) {
       if (sheet.dynamics.inverse_mass[i] == 0) continue;
@@ -361,7 +374,7 @@ bool Simulation::State::quiet() const {
 }
 
 // Computes the next frame from the state that the solvers are in, and has it looked at.
-Attempt Simulation::State::attempt(Crew& crew) {
+Attempt Simulation::State::attempt(Crew& crew, NextStates& next) {
   const double begin = time();
   for (std::int64_t k = 0; k < plan.step.substeps; ++k)
     step(begin + static_cast<double>(k) * plan.step.substep, plan.step.substep, crew);
@@ -369,14 +382,13 @@ Attempt Simulation::State::attempt(Crew& crew) {
   Attempt made{{}, {}, halvings};
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     Sheet& sheet = sheets[s];
-    sheet.read(sheet.next);
+    sheet.read(next[s]);
     const Drive drive{scene.environment.gravity,
                       drive_speed(scene, scene.sheets[s], begin, begin + scene.solver.frame_step),
                       scene.solver.frame_step};
-    made.sheets.push_back(
-        scene.solver.max_repairs == 0
-            ? inspect_finite(sheet.next)
-            : inspect(sheet.mesh, drive, sheet.most_strain, sheet.good, sheet.next));
+    made.sheets.push_back(scene.solver.max_repairs == 0
+                              ? inspect_finite(next[s])
+                              : inspect(sheet.mesh, drive, sheet.most_strain, sheet.good, next[s]));
     if (made.reason.empty() && !made.sheets.back().reason.empty())
       made.reason = scene.sheets[s].name + ": " + made.sheets.back().reason;
   }
@@ -384,11 +396,11 @@ Attempt Simulation::State::attempt(Crew& crew) {
 }
 
 // Attempts the next frame until it can be trusted; false: repairs are used up.
-bool Simulation::State::compute_frame(Crew& crew) {
+bool Simulation::State::compute_frame(Crew& crew, NextStates& next) {
   const std::size_t repairs_before = repairs.size();
   const int halvings_before = halvings;
   for (std::optional<Attempt> doubtful;;) {
-    Attempt made = attempt(crew);
+    Attempt made = attempt(crew, next);
     if (made.reason.empty()) return true;
     if (doubtful && made.confirms(*doubtful)) {
       // the longer step was right: it goes on from here
@@ -396,11 +408,11 @@ bool Simulation::State::compute_frame(Crew& crew) {
         sheets[s].most_strain = std::max(sheets[s].most_strain, 2 * made.sheets[s].strain);
       set_halvings(doubtful->halvings);
       repairs.resize(repairs_before + static_cast<std::size_t>(halvings - halvings_before));
-      for (Sheet& sheet : sheets) {
+      for (std::size_t s = 0; s < sheets.size(); ++s) {
         Matrix3Xd v;
         const double end = time() + scene.solver.frame_step;
-        sheet.solver->closing_velocities(end, v);
-        sheet.solver->start(sheet.next.x, v, end, plan.step.substep);
+        sheets[s].solver->closing_velocities(end, v);
+        sheets[s].solver->start(next[s].x, v, end, plan.step.substep);
       }
       return true;
     }
@@ -452,11 +464,12 @@ bool Simulation::advance_frame(Crew& crew) {
     return true;
   }
 
-  if (!state.failure.empty() || !state.change_textiles() || !state.compute_frame(crew))
+  NextStates& next = next_states(state.sheets.size());
+  if (!state.failure.empty() || !state.change_textiles() || !state.compute_frame(crew, next))
     return false;
   state.substeps = state.plan.step.substeps;
-  state.frames_at_rest = state.quiet() ? state.frames_at_rest + 1 : 0;
-  for (Sheet& sheet : state.sheets) std::swap(sheet.good, sheet.next);
+  state.frames_at_rest = state.quiet(next) ? state.frames_at_rest + 1 : 0;
+  for (std::size_t s = 0; s < next.size(); ++s) std::swap(state.sheets[s].good, next[s]);
   ++state.frame;
   return true;
 }

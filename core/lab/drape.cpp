@@ -58,11 +58,11 @@ class Cells {
 // A family with the connections that are there, one for each share.
 void add_shares(const Family& family, const BendingLaw& bending, const Cells& cells,
                 const Eigen::ArrayXi& place, Mesh& mesh) {
-  std::map<double, std::vector<Connection>> by_share;
+  std::map<double, Connections> by_share;
   for (const auto& [i, j] : family.connections)
     if (place[i] >= 0 && place[j] >= 0)
       if (const double share = cells.share(i, j); share > 0)
-        by_share[share].emplace_back(place[i], place[j]);
+        by_share[share].add(place[i], place[j]);
   for (auto& [share, connections] : by_share) {
     Family part{family.kind,  family.rest_length,     share * family.stiffness,
                 std::nullopt, std::move(connections), family.pushes};
@@ -225,7 +225,6 @@ Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, dou
   disc.start.resize(3, count);
   disc.held.resize(count);
   disc.mesh.mass.resize(count);
-  disc.mesh.drag.setZero(count);
   const Vector3d middle = square.start.col(square.at(side / 2, side / 2));
   for (int i = 0, next = 0; i < side * side; ++i) {
     if (there[i] == 0) continue;

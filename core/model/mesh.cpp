@@ -10,14 +10,13 @@ namespace {
 // Connections from every particle to the one `rows` and `columns` away.
 enum class Part { kAll, kEdge, kInside };
 
-std::vector<Connection> connections(const Grid& grid, int rows, int columns,
-                                    Part part = Part::kAll) {
-  std::vector<Connection> out;
+Connections connections(const Grid& grid, int rows, int columns, Part part = Part::kAll) {
+  Connections out;
   for (int r = 0; r + rows < grid.rows; ++r) {
     for (int c = std::max(0, -columns); c < grid.columns && c + columns < grid.columns; ++c) {
       const bool edge = rows == 0 ? r == 0 || r == grid.rows - 1 : c == 0 || c == grid.columns - 1;
       if (part == Part::kAll || edge == (part == Part::kEdge))
-        out.emplace_back(r * grid.columns + c, (r + rows) * grid.columns + c + columns);
+        out.add(r * grid.columns + c, (r + rows) * grid.columns + c + columns);
     }
   }
   return out;
@@ -96,6 +95,19 @@ void add_stencils(Mesh& mesh, const Grid& grid, const LatticeConstants& k) {
 
 }  // namespace
 
+void Connections::add(int i, int j) {
+  ++size_;
+  if (!runs_.empty() && runs_.back().apart == j - i) {
+    Run& last = runs_.back();
+    if (last.count == 1) last.step = i - last.first;
+    if (i == last.first + last.count * last.step) {
+      ++last.count;
+      return;
+    }
+  }
+  runs_.push_back({i, 0, j - i, 1});
+}
+
 bool resists_compression(const BendingLaw& bending) {
   const auto* isometric = std::get_if<Isometric>(&bending);
   return isometric != nullptr && isometric->resist_compression;
@@ -128,19 +140,21 @@ Mesh make_lattice(const SheetDefinition& sheet) {
 
   // mass and drag: of the area that belongs to a particle, or one for all
   mesh.mass.resize(sheet.particle_count());
-  mesh.drag.resize(sheet.particle_count());
+  const bool drags =
+      std::visit([](const auto& model) { return model.air_drag > 0; }, sheet.textile.model);
+  if (drags) mesh.drag.resize(sheet.particle_count());
   for (int r = 0; r < grid.rows; ++r) {
     for (int c = 0; c < grid.columns; ++c) {
       const int i = r * grid.columns + c;
       if (const auto* raw = std::get_if<RawTextile>(&sheet.textile.model)) {
         mesh.mass[i] = raw->particle_mass;
-        mesh.drag[i] = raw->air_drag;
+        if (drags) mesh.drag[i] = raw->air_drag;
       } else {
         const auto& measured = std::get<MeasuredTextile>(sheet.textile.model);
         const double share =
             (r == 0 || r == grid.rows - 1 ? 0.5 : 1) * (c == 0 || c == grid.columns - 1 ? 0.5 : 1);
         mesh.mass[i] = measured.areal_density * h * h * share;
-        mesh.drag[i] = measured.air_drag * h * h * share;
+        if (drags) mesh.drag[i] = measured.air_drag * h * h * share;
       }
     }
   }
@@ -166,22 +180,29 @@ Mesh make_lattice(const SheetDefinition& sheet) {
     return idle || family.connections.empty();
   });
 
-  for (const auto& [i, j] : connections(grid, 1, 1)) {
+  const Connections cells = connections(grid, 1, 1);
+  mesh.triangles.reserve(2 * cells.size());
+  for (const auto& [i, j] : cells) {
     mesh.triangles.push_back({i, j - 1, i + 1});
     mesh.triangles.push_back({j, i + 1, j - 1});
   }
   return mesh;
 }
 
+StartPositions::StartPositions(const SheetDefinition& sheet)
+    : sheet_(sheet), rotation_(sheet.rotation.normalized().toRotationMatrix()) {}
+
+Vector3d StartPositions::operator()(int particle) const {
+  if (!sheet_.start_positions.empty())
+    return Eigen::Map<const Vector3d>(sheet_.start_positions.data() + 3 * std::ptrdiff_t{particle});
+  const int r = particle / sheet_.grid.columns, c = particle % sheet_.grid.columns;
+  return sheet_.origin + rotation_ * Vector3d(c * sheet_.grid.spacing, 0, r * sheet_.grid.spacing);
+}
+
 Matrix3Xd start_positions(const SheetDefinition& sheet) {
-  if (!sheet.start_positions.empty())
-    return Eigen::Map<const Matrix3Xd>(sheet.start_positions.data(), 3, sheet.particle_count());
+  const StartPositions start(sheet);
   Matrix3Xd x(3, sheet.particle_count());
-  const Eigen::Matrix3d rotation = sheet.rotation.normalized().toRotationMatrix();
-  for (int r = 0; r < sheet.grid.rows; ++r)
-    for (int c = 0; c < sheet.grid.columns; ++c)
-      x.col(r * sheet.grid.columns + c) =
-          sheet.origin + rotation * Vector3d(c * sheet.grid.spacing, 0, r * sheet.grid.spacing);
+  for (int i = 0; i < sheet.particle_count(); ++i) x.col(i) = start(i);
   return x;
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <iterator>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -18,6 +19,43 @@ using Eigen::VectorXd;
 // Particles i and j, each pair once.
 using Connection = std::pair<int, int>;
 
+// Connections one after the other, as runs of equal ones: in a lattice those of a row, or more.
+class Connections {
+  struct Run {
+    int first, step, apart, count;  // first + k step is connected with what lies `apart` from it
+  };
+
+ public:
+  class Iterator {
+   public:
+    Iterator(const Run* run, const Run* end) : run_(run), end_(end) { begin_run(); }
+    Connection operator*() const { return {i_, i_ + run_->apart}; }
+    Iterator& operator++() {
+      i_ += run_->step;
+      if (--left_ == 0) ++run_, begin_run();
+      return *this;
+    }
+    bool operator==(std::default_sentinel_t) const { return run_ == end_; }
+
+   private:
+    void begin_run() {
+      if (run_ != end_) i_ = run_->first, left_ = run_->count;
+    }
+    const Run *run_, *end_;
+    int i_ = 0, left_ = 0;
+  };
+
+  void add(int i, int j);
+  Iterator begin() const { return {runs_.data(), runs_.data() + runs_.size()}; }
+  static std::default_sentinel_t end() { return std::default_sentinel; }
+  std::size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+
+ private:
+  std::vector<Run> runs_;
+  std::size_t size_ = 0;
+};
+
 enum class FamilyKind { kStretch, kShear, kBend, kDiagonalBend };
 
 // Connections that share a law and its constants.
@@ -26,7 +64,7 @@ struct Family {
   double rest_length;                // L, m
   double stiffness;                  // k of eq. 2, N/m; 0 for bend
   std::optional<BendingForce> bend;  // eq. 3 to 5; absent: no force
-  std::vector<Connection> connections;
+  Connections connections;
   bool pushes = false;  // where it is shortened, as it pulls by eq. 2
 };
 
@@ -40,7 +78,7 @@ struct Stencil {
 // Particles and connections: all that forces know of a sheet. A rectangular lattice makes one.
 struct Mesh {
   VectorXd mass;       // (particles) kg
-  VectorXd drag;       // (particles) in still air, kg/s
+  VectorXd drag;       // (particles) in still air, kg/s; or empty: none
   double damping = 0;  // k_d of every connection, kg/s
   std::vector<Family> families;
   std::vector<Stencil> stencils;
@@ -69,7 +107,16 @@ IsometricStiffness isometric_stiffness(const LatticeConstants& constants, double
 
 Mesh make_lattice(const SheetDefinition& sheet);
 
-// Positions at the start: those given, or the lattice as it is placed.
+// Positions at the start: those given, or the lattice as it is placed. Holds on to the sheet.
+class StartPositions {
+ public:
+  explicit StartPositions(const SheetDefinition& sheet);
+  Vector3d operator()(int particle) const;  // m
+
+ private:
+  const SheetDefinition& sheet_;
+  Eigen::Matrix3d rotation_;
+};
 Matrix3Xd start_positions(const SheetDefinition& sheet);
 // Velocities at the start, m/s.
 Matrix3Xd start_velocities(const SheetDefinition& sheet);

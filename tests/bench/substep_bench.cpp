@@ -71,7 +71,8 @@ void advance(benchmark::State& state, const Case& given, std::optional<Simulatio
 void hold(benchmark::State& state, int rows) {
   SheetDefinition sheet = testing::flat_sheet(rows, rows);
   sheet.pins = {{{0, rows - 1}, {}}};
-  const Scene scene = testing::floating(sheet);
+  Scene scene = testing::floating(sheet);
+  scene.solver.precision = Precision::kSingle;  // as sessions are
   constexpr int kCount = 16;
   for (auto _ : state) {
     std::vector<Simulation> simulations;

@@ -55,6 +55,26 @@ TEST(Simulation, EqualScenesGiveEqualBits) {
             0);
 }
 
+// What a frame is computed in is one for all simulations of a thread.
+TEST(Simulation, SimulationsThatTakeTurnsDoNotDisturbEachOther) {
+  Scene small = floating(flat_sheet(3, 4)), two = hanging();
+  small.environment.gravity = {0, -9.8, 0};
+  two.sheets.push_back(flat_sheet(5, 9));
+  two.sheets.back().name = "second";
+  std::vector<Simulation> together, alone;
+  for (const Scene& scene : {two, small, hanging()}) {
+    together.emplace_back(scene);
+    run(alone.emplace_back(scene), 5);
+  }
+  for (int frame = 0; frame < 5; ++frame)
+    for (Simulation& simulation : together) run(simulation, 1);
+  for (std::size_t k = 0; k < alone.size(); ++k) {
+    EXPECT_EQ(positions(together[k]), positions(alone[k]));
+    EXPECT_EQ(velocities(together[k]), velocities(alone[k]));
+    EXPECT_EQ(together[k].stats().kinetic_energy, alone[k].stats().kinetic_energy);
+  }
+}
+
 TEST(Simulation, AHeldParticleNeverMovesAndALedOneNeverLeavesItsPath) {
   for (const auto integrator : {IntegratorKind::kVerlet, IntegratorKind::kRk4}) {
     Scene scene = hanging();

@@ -34,6 +34,18 @@ std::map<FamilyKind, std::size_t> counts(const Mesh& mesh) {
   return out;
 }
 
+TEST(Mesh, ConnectionsComeAsTheyWereAdded) {
+  const std::vector<Connection> added = {{0, 1}, {1, 2}, {2, 3}, {4, 5},  {4, 5}, {7, 5},
+                                         {6, 4}, {0, 9}, {3, 9}, {10, 3}, {1, 8}, {3, 10}};
+  Connections connections;
+  EXPECT_TRUE(connections.empty());
+  for (const auto& [i, j] : added) connections.add(i, j);
+  std::vector<Connection> found;
+  for (const Connection& connection : connections) found.push_back(connection);
+  EXPECT_EQ(found, added);
+  EXPECT_EQ(connections.size(), added.size());
+}
+
 TEST(Mesh, APaperSheetHasThePapersConnectionsEachOnce) {
   auto found = counts(make_lattice(flat_sheet(31, 31)));
   EXPECT_EQ(found[FamilyKind::kStretch], 1860u);

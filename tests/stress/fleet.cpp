@@ -48,7 +48,7 @@ Fleet::Fleet(std::size_t replicas, const std::string& hard_stop) {
   for (std::size_t number = 0; number < replicas; ++number) {
     replicas_.push_back(std::make_unique<Weftd>(
         std::vector<std::string>{"--database", database_->url(), "--replica", name(number),
-                                 "--snapshot-ms", "100", "--history-bytes", "4194304"}));
+                                 "--snapshot-ms", "20", "--history-bytes", "1048576"}));
   }
   start_balancer(hard_stop);
 }

@@ -387,11 +387,10 @@ void Session::write_reach() {
     const std::int64_t wanted = std::min(latest() + ahead / 2, goal());
     const bool suffices = !active() || (reach_.frame >= wanted && reach_suffices());
     if (suffices && has_readers() == reach_.history_from.has_value()) return;
-    constexpr std::int64_t kLeast = 8;
     const auto now = Clock::now();
     if (!suffices) {
       if (now - reach_time_ < reach_interval_) ahead_ = std::min(2 * ahead_, kMostAhead);
-      if (now - reach_time_ > 4 * reach_interval_) ahead_ = std::max(ahead_ / 2, kLeast);
+      if (now - reach_time_ > 4 * reach_interval_) ahead_ = std::max(ahead_ / 2, kLeastAhead);
       reach_time_ = now;
     }
     reach = reach_to(std::min(latest() + ahead, goal()));
@@ -806,11 +805,13 @@ std::int64_t Session::reach_after(const Event& event) const {
   return goes_on ? std::max(latest(), reach_.frame) : latest();
 }
 
-// Frames that the reach is put ahead: at a pace, those of the time for two of its writes.
+// Frames that the reach is put ahead: at a pace, those of the time for two of its writes, and no
+// more where it catches up, for a restart computes all of them.
 std::int64_t Session::ahead_of(std::optional<double> time_scale) const {
-  const double seconds = 2 * reach_interval_.count() * time_scale.value_or(0);
-  const double frames = seconds / scene_.solver.frame_step;
-  return std::max(ahead_, static_cast<std::int64_t>(std::min(frames, 1.0 * kMostAhead)));
+  if (!time_scale) return ahead_;
+  const double frames = 2 * reach_interval_.count() * *time_scale / scene_.solver.frame_step;
+  return std::clamp(static_cast<std::int64_t>(std::min(frames, 1.0 * kMostAhead)), kLeastAhead,
+                    kMostAhead);
 }
 
 // Whether the log knows of all subscribers that frames are held for.

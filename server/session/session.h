@@ -283,7 +283,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::vector<NamedSnapshot> named_;       // in order of frame
   Writing writing_;
   Reach reach_;  // as it was written last
-  static constexpr std::int64_t kMostAhead = 16'384;
+  static constexpr std::int64_t kLeastAhead = 8, kMostAhead = 16'384;
   std::int64_t ahead_ = 16;       // frames that the reach is put ahead, or more
   Clock::time_point reach_time_;  // when it was
   std::optional<Restoring> restoring_;

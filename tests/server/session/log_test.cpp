@@ -212,6 +212,18 @@ TEST_F(SessionLogTest, SaysHowFarFramesGoBeforeTheyArePublished) {
   EXPECT_EQ(disk_->past().reach.frame, 3000);
 }
 
+TEST_F(SessionLogTest, SaysOfARunAtAPaceNoMoreThanThatHoweverFastTheSessionWas) {
+  const auto session = make(disk_);
+  const auto watcher = Watcher::of(*session, 0);
+  run(*session, 3000).applied();
+  while (watcher->read().frame->number < 3000) {
+  }
+  RunCommand command;
+  command.time_scale = 1e-3;  // a frame in 17 s
+  Answer(*session, command).applied();
+  EXPECT_LE(disk_->past().reach.frame, 3008);
+}
+
 TEST_F(SessionLogTest, StandsStillWhereTheDiskDoesNotYetSayHowFarFramesGo) {
   const auto session = make(disk_), other = make(std::make_shared<Disk>());
   disk_->slow = true;

@@ -17,6 +17,14 @@ ServerOptions little_history() {
   return options;
 }
 
+// 4 x 5 and 4 x 6 particles.
+v1::Scene two_sheets() {
+  v1::Scene scene = small_scene();
+  *scene.add_sheets() = scene.sheets(0);
+  scene.mutable_sheets(1)->mutable_grid()->set_columns(6);
+  return scene;
+}
+
 void expect_numbers(const std::vector<v1::Frame>& frames, std::int64_t first, std::int64_t last) {
   ASSERT_THAT(frames, SizeIs(last - first + 1));
   for (const auto& frame : frames) EXPECT_EQ(frame.number(), first++);
@@ -36,10 +44,7 @@ std::vector<double> doubles(const std::string& bytes) {
 
 TEST(StreamFrames, SendsAHeaderAndThenEveryFrameInOrder) {
   Service service;
-  v1::Scene scene = small_scene();
-  *scene.add_sheets() = scene.sheets(0);
-  scene.mutable_sheets(1)->mutable_grid()->set_columns(6);
-  const v1::Session session = service.create(scene);
+  const v1::Session session = service.create(two_sheets());
   service.step(session, 5);
   Stream stream(service, frames_of(session, 0, 5));
   const v1::StreamHeader header = stream.header();
@@ -349,10 +354,7 @@ TEST(StreamFrames, ReachesClientsWithGrpcsUsualLimitsFromSheetsOfAnySize) {
 
 TEST(StreamFrames, SendsNormalsOfEachSheet) {
   Service service;
-  v1::Scene scene = small_scene();
-  *scene.add_sheets() = scene.sheets(0);
-  scene.mutable_sheets(1)->mutable_grid()->set_columns(6);
-  const v1::Session session = service.create(scene);
+  const v1::Session session = service.create(two_sheets());
   service.step(session, 30);
   auto request = frames_of(session, 30, 30);
   request.mutable_format()->set_normals(true);

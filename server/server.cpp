@@ -140,7 +140,9 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
 
 Server::~Server() {
   stop();
-  parts_->backend.planner.stop();  // the scene it is at still needs the services
+  // the scenes that they are at still need the services
+  parts_->backend.planner.stop();
+  parts_->backend.large_planner.stop();
   parts_->backend.store_calls.stop();
   parts_->backend.scheduler.stop();  // and sessions the store
 }
@@ -176,6 +178,7 @@ void Server::stop(std::chrono::milliseconds deadline) {
   parts_->backend.registry.close(Refusal::Why::kDraining);
   parts_->sessions.drain();
   parts_->backend.planner.drain();
+  parts_->backend.large_planner.drain();
   parts_->backend.store_calls.drain();
   parts_->lab.drain();
   const bool ended = parts_->backend.calls.wait_for_none(end);

@@ -70,6 +70,7 @@ struct Backend {
   Stats stats;
   Scheduler scheduler;
   SlowCalls planner{"creations", "too many sessions are being created"};
+  SlowCalls large_planner{"creations", "too many large sessions are being created"};
   SlowCalls store_calls{"store_calls", "too many calls wait for the store"};
   std::mutex claiming;
   const std::unique_ptr<SessionStore> store;

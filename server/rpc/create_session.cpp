@@ -13,6 +13,9 @@
 namespace weft {
 namespace {
 
+// Scenes of more particles take longer than a tenth of a second to plan.
+constexpr std::int64_t kLarge = 4096;
+
 // Without sheets that are larger than any that is simulated.
 std::int64_t particles_of(const v1::Scene& scene) {
   constexpr std::int64_t kMostRows = 4096;
@@ -63,9 +66,10 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
   // what a full server refuses does not wait for the plans of others
   if (const auto status = refusal(who, *request, request->session_id()); !status.ok())
     return answer(context, status);
-  return create_later(response, [this, who, request = *request](v1::Session& session) {
-    return create(who, request, session);
-  });
+  return create_later(particles_of(request->session().scene()), response,
+                      [this, who, request = *request](v1::Session& session) {
+                        return create(who, request, session);
+                      });
 }
 
 grpc::ServerUnaryReactor* SessionService::RestoreSession(grpc::CallbackServerContext* context,
@@ -73,18 +77,21 @@ grpc::ServerUnaryReactor* SessionService::RestoreSession(grpc::CallbackServerCon
                                                          v1::Session* response) {
   const auto caller = backend_.access.caller(*context);
   if (const auto* error = std::get_if<grpc::Status>(&caller)) return answer(context, *error);
-  return create_later(
-      response, [this, who = std::get<Caller>(caller), request = *request](v1::Session& session) {
-        return restore(who, request, session);
-      });
+  const auto parts = read_snapshot_name(request->name());
+  const auto source = parts ? backend_.registry.find(parts->session) : nullptr;
+  return create_later(source ? source->particle_count() : 0, response,
+                      [this, who = std::get<Caller>(caller), request = *request](
+                          v1::Session& session) { return restore(who, request, session); });
 }
 
-// Planning a scene takes its time: not on a thread of gRPC's. `make` has copies of what it needs:
-// it may outlive the call.
-grpc::ServerUnaryReactor* SessionService::create_later(v1::Session* response, Make make) {
+// Planning a scene takes its time: not on a thread of gRPC's, and small ones do not wait for large
+// ones. `make` has copies of what it needs: it may outlive the call.
+grpc::ServerUnaryReactor* SessionService::create_later(std::int64_t particles,
+                                                       v1::Session* response, Make make) {
   auto* call = new UnaryCall(backend_.calls);
   const auto session = std::make_shared<v1::Session>();
-  backend_.planner.ask(
+  SlowCalls& planner = particles > kLarge ? backend_.large_planner : backend_.planner;
+  planner.ask(
       [this, session, make = std::move(make)] {
         try {
           grpc::Status status = make(*session);

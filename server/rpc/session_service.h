@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -83,7 +84,7 @@ class SessionService final : public SessionMethods {
 
  private:
   using Make = std::function<grpc::Status(v1::Session&)>;
-  grpc::ServerUnaryReactor* create_later(v1::Session* response, Make make);
+  grpc::ServerUnaryReactor* create_later(std::int64_t particles, v1::Session* response, Make make);
   grpc::Status refusal(const Caller& caller, const v1::CreateSessionRequest& request,
                        const std::string& id) const;
   grpc::Status create(const Caller& caller, const v1::CreateSessionRequest& request,

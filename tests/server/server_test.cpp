@@ -106,6 +106,11 @@ TEST_F(WhileScenesArePlanned, OtherSessionsGoOn) {
   EXPECT_GT(planned_, 0);
 }
 
+TEST_F(WhileScenesArePlanned, SmallOnesAreCreated) {
+  service_.create();
+  EXPECT_GT(planned_, 0);
+}
+
 TEST_F(WhileScenesArePlanned, TheServerStopsAndAnswersEveryCall) {
   while (planned_ == kScenes) std::this_thread::yield();  // until the calls are there
   service_.server.stop();

@@ -231,27 +231,17 @@ BendingForce::BendingForce(const ChoiKo& law, double bend, double clamp, double 
   if (law.evaluator == Evaluator::kLinearized && law.fold_clamp) {
     curve_end_ = 2;  // the table holds the clamp
     clamp_rules_ = normalized < kClampRules;
-    return;
+  } else {
+    std::tie(curve_begin_, curve_end_) =
+        std::visit([&](const auto& g) { return range_of_curve(g, normalized); }, function_);
+    clamp_rules_ = curve_begin_ >= curve_end_;
   }
-  std::tie(curve_begin_, curve_end_) =
-      std::visit([&](const auto& g) { return range_of_curve(g, normalized); }, function_);
-  clamp_rules_ = curve_begin_ >= curve_end_;
+  end_integral_ =
+      std::visit([&](const auto& g) { return g.integral(std::min(curve_end_, 1.0)); }, function_);
 }
 
 double BendingForce::energy(double length) const {
-  const double r = std::min(length * inverse_length_, 1.0);
-  const double end = std::min(curve_end_, 1.0);
-  const auto clamp_energy = [&](double from, double to) {  // of the clamp between two r, from > to
-    return clamp_ / 2 * rest_length_ * rest_length_ *
-           ((1 - to) * (1 - to) - (1 - from) * (1 - from));
-  };
-  if (clamp_rules_ || r >= end) return clamp_energy(1, r);
-  const double curve = std::visit(
-      [&](const auto& g) {
-        return scale_ * rest_length_ * (g.integral(std::max(r, curve_begin_)) - g.integral(end));
-      },
-      function_);
-  return clamp_energy(1, end) + curve + (r < curve_begin_ ? clamp_energy(curve_begin_, r) : 0);
+  return std::visit([&](const auto& g) { return energy(g, length); }, function_);
 }
 
 double BendingForce::least_curvature() const {

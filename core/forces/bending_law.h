@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <variant>
@@ -108,21 +109,38 @@ class BendingForce {
   double clamp() const { return clamp_; }              // c_b, N/m
   double rest_length() const { return rest_length_; }  // L, m
 
-  double energy(double length) const;  // J
-  double slope(double length) const;   // d force / d length, N/m
-  double largest_slope() const;        // bound of slope() over all lengths, N/m
+  // J
+  template <class Function>
+  double energy(const Function& g, double length) const {
+    const double r = std::min(length * inverse_length_, 1.0), end = std::min(curve_end_, 1.0);
+    if (clamp_rules_ || r >= end) return clamp_energy(1, r);
+    const double curve =
+        scale_ * rest_length_ * (g.integral(std::max(r, curve_begin_)) - end_integral_);
+    return clamp_energy(1, end) + curve + (r < curve_begin_ ? clamp_energy(curve_begin_, r) : 0);
+  }
+  double energy(double length) const;
+
+  double slope(double length) const;  // d force / d length, N/m
+  double largest_slope() const;       // bound of slope() over all lengths, N/m
   // kappa* = sqrt(288 k_b / (c_b L^5)), 1/m: less bent than this, the clamp holds the connection.
   double least_curvature() const;
   // Whether the clamp rules for every length, so that k_b has no effect.
   bool clamp_rules() const { return clamp_rules_; }
 
  private:
+  // Of the clamp between two r, from > to, J.
+  double clamp_energy(double from, double to) const {
+    return clamp_ / 2 * rest_length_ * rest_length_ *
+           ((1 - to) * (1 - to) - (1 - from) * (1 - from));
+  }
+
   BendingFunction function_;
   double rest_length_, inverse_length_;
   double scale_;  // k_b / L^2
   double clamp_;  // c_b
   bool clamp_rules_ = true;
   double curve_begin_ = 0, curve_end_ = 0;  // range of r in which g rules, not the clamp
+  double end_integral_ = 0;                 // of g, at the end of that range
 };
 
 // Below this c_b L^3 / k_b the clamp of eq. 5 lies above g everywhere.

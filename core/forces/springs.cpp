@@ -58,15 +58,22 @@ void add_spring_forces(const Mesh& mesh, const Matrix3Xd& x, const Matrix3Xd& v,
 double spring_energy(const Mesh& mesh, const Matrix3Xd& x) {
   double energy = 0;
   for (const Family& family : mesh.families) {
-    for (const auto& [i, j] : family.connections) {
-      const double length = (x.col(j) - x.col(i)).norm();
-      if (family.bend) {
-        energy += family.bend->energy(length);
-      } else {
-        const double stretch =
-            std::max(family.pushes ? -family.rest_length : 0.0, length - family.rest_length);
-        energy += family.stiffness / 2 * stretch * stretch;
-      }
+    const auto add = [&](const auto& of_length) {
+      for (const auto& [i, j] : family.connections)
+        energy += of_length((x.col(j) - x.col(i)).norm());
+    };
+    if (family.bend) {
+      std::visit(
+          [&](const auto& g) {
+            add([&](double length) { return family.bend->energy(g, length); });
+          },
+          family.bend->function());
+    } else {
+      const double slack = family.pushes ? -family.rest_length : 0;
+      add([&](double length) {
+        const double stretch = std::max(slack, length - family.rest_length);
+        return family.stiffness / 2 * stretch * stretch;
+      });
     }
   }
   return energy;

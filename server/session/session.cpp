@@ -62,6 +62,7 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
       snapshot_after_(host.snapshot_after),
       max_snapshots_(host.max_snapshots),
       reach_interval_(host.reach_time),
+      return_time_(host.return_time),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),
       history_(host.history_bytes) {
@@ -85,7 +86,11 @@ bool Session::restore(SessionPast past) {
           Restoring{{std::make_move_iterator(next), std::make_move_iterator(past.log.end())},
                     past.reach.frame};
     }
-    if (past.reach.history_from) readers_until_ = Clock::now() + kHoldAfterRestore;
+    if (past.reach.history_from) {
+      readers_until_ = Clock::now() + kHoldAfterRestore;
+      taken_.push_back({Clock::now(), *past.reach.history_from});
+      past_readers_ = past.reach.readers;
+    }
     if (past.reach.holders > 0) {
       past_holders_ =
           PastHolders{past.reach.holders, past.reach.held_from, Clock::now() + kHoldAfterRestore};
@@ -386,7 +391,8 @@ void Session::write_reach() {
     const std::int64_t ahead = run_ ? ahead_of(run_->time_scale) : ahead_;
     const std::int64_t wanted = std::min(latest() + ahead / 2, goal());
     const bool suffices = !active() || (reach_.frame >= wanted && reach_suffices());
-    if (suffices && has_readers() == reach_.history_from.has_value()) return;
+    if (suffices && has_readers() == reach_.history_from.has_value() && readers() == reach_.readers)
+      return;
     const auto now = Clock::now();
     if (!suffices) {
       if (now - reach_time_ < reach_interval_) ahead_ = std::min(2 * ahead_, kMostAhead);
@@ -773,8 +779,24 @@ Reach Session::reach_to(std::int64_t frame) {
     if (subscription->policy_ == SlowReader::kHoldSession) ++reach.holders;
   }
   if (reach.holders == 0) reach.held_from = 0;
-  if (has_readers()) reach.history_from = history_.oldest();
+  if (has_readers()) reach.history_from = wanted_from();
+  reach.readers = readers();
   return reach;
+}
+
+// The first frame that subscribers may want again if they are cut off, as far as it is kept. What
+// was sent to them may never have come, so it is not enough that they have taken it.
+std::int64_t Session::wanted_from() {
+  constexpr int kNotes = 60;
+  const auto now = Clock::now();
+  std::int64_t next = std::numeric_limits<std::int64_t>::max();
+  for (const Subscription* subscription : subscriptions_)
+    if (subscription->policy_ != SlowReader::kSkip) next = std::min(next, subscription->next_);
+  if (is_recorded() && (taken_.empty() || now - taken_.back().time >= return_time_ / kNotes))
+    taken_.push_back({now, next});
+  while (taken_.size() > 1 && now - taken_[1].time >= return_time_) taken_.pop_front();
+  for (const Taken& taken : taken_) next = std::min(next, taken.next);
+  return std::clamp(next, history_.oldest(), latest());
 }
 
 // Whether there are subscribers that want every frame.
@@ -786,6 +808,13 @@ bool Session::is_recorded() const {
 // Whether there are such, or some that may come back.
 bool Session::has_readers() const {
   return is_recorded() || past_holders_ || Clock::now() < readers_until_;
+}
+
+int Session::readers() const {
+  const auto here =
+      std::count_if(subscriptions_.begin(), subscriptions_.end(),
+                    [](const auto* each) { return each->policy_ != SlowReader::kSkip; });
+  return static_cast<int>(here) + (Clock::now() < readers_until_ ? past_readers_ : 0);
 }
 
 // How far frames may be published once the event is in the log.

@@ -79,6 +79,8 @@ struct SessionHost {
   // about as long without an answer.
   static constexpr std::chrono::duration<double> kReachTime{0.5};
   std::chrono::duration<double> reach_time = kReachTime;
+  // Frames that all subscribers had taken longer ago are not there any more after a restart.
+  std::chrono::duration<double> return_time{60};
 };
 
 // A simulation that advances on a scheduler. Calls reach it as commands that are carried out
@@ -225,11 +227,13 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   bool steps_begun() const { return !steps_.empty() && steps_.front().first; }
   std::int64_t goal() const;
   Reach reach_to(std::int64_t frame);
+  std::int64_t wanted_from();
   std::int64_t reach_after(const Event& event) const;
   std::int64_t ahead_of(std::optional<double> time_scale) const;
   bool reach_suffices();
   bool is_recorded() const;
   bool has_readers() const;
+  int readers() const;
   std::int64_t first_held_frame();
   Progress progress() const;
   Refusal refuse(Refusal::Why why, std::vector<Problem> problems = {}) const {
@@ -262,6 +266,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::int64_t entries_in_snapshot_ = 0;  // the last one; touched by the slice only
   const std::size_t max_snapshots_;
   const std::chrono::duration<double> reach_interval_;
+  const std::chrono::duration<double> return_time_;
 
   mutable std::mutex mutex_;  // guards all below
   std::deque<Command> commands_;
@@ -289,6 +294,12 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::optional<Restoring> restoring_;
   std::optional<PastHolders> past_holders_;
   Clock::time_point readers_until_;  // those of the past may come back until then
+  int past_readers_ = 0;             // that have not
+  struct Taken {
+    Clock::time_point time;
+    std::int64_t next;  // the first frame that not all of them had taken
+  };
+  std::deque<Taken> taken_;  // within the return time, the newest last
 };
 
 }  // namespace weft

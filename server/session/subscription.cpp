@@ -33,6 +33,8 @@ std::unique_ptr<Subscription> Session::subscribe(std::weak_ptr<FrameSink> sink,
   subscriptions_.push_back(subscription.get());
   if (policy == SlowReader::kHoldSession && past_holders_ && --past_holders_->count == 0)
     past_holders_.reset();
+  // where each begins says what has come to it
+  if (policy != SlowReader::kSkip && past_readers_ > 0 && --past_readers_ == 0) taken_.clear();
   release();
   lock.unlock();
   wake();

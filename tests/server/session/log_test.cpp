@@ -121,18 +121,20 @@ class DiskLog : public SessionLog {
 
 class SessionLogTest : public ::testing::Test {
  protected:
-  std::shared_ptr<Session> make(const std::shared_ptr<Disk>& disk) {
-    return std::make_shared<Session>(make_identity("test", "test"), Simulation(hung_scene()),
-                                     SessionHost{scheduler_, stats(), kMuchHistory},
+  SessionHost host(std::size_t history_bytes = kMuchHistory) {
+    return {scheduler_, stats(), history_bytes};
+  }
+  static std::shared_ptr<Session> make(const std::shared_ptr<Disk>& disk, const SessionHost& host) {
+    return std::make_shared<Session>(make_identity("test", "test"), Simulation(hung_scene()), host,
                                      std::make_unique<DiskLog>(disk));
   }
+  std::shared_ptr<Session> make(const std::shared_ptr<Disk>& disk) { return make(disk, host()); }
   // One that takes a snapshot of every frame.
   std::shared_ptr<Session> make_kept(const std::shared_ptr<Disk>& disk,
                                      std::size_t history_bytes = kMuchHistory) {
-    SessionHost host{scheduler_, stats(), history_bytes};
-    host.snapshot_after = {};
-    return std::make_shared<Session>(make_identity("test", "test"), Simulation(hung_scene()), host,
-                                     std::make_unique<DiskLog>(disk));
+    SessionHost often = host(history_bytes);
+    often.snapshot_after = {};
+    return make(disk, often);
   }
   // The session that another process would have.
   std::shared_ptr<Session> restored(const SessionPast& past) {
@@ -433,6 +435,43 @@ TEST_F(SessionLogTest, WithASnapshotGivesReadersTheFramesThatTheyHad) {
   for (std::int64_t frame = oldest; frame <= 300; ++frame) {
     ASSERT_EQ(reader->read().frame->number, frame);
   }
+}
+
+// A restart computes frames again from where this says.
+TEST_F(SessionLogTest, SaysWhatReadersMayWantAgainAndNoMore) {
+  SessionHost at_once = host();
+  at_once.return_time = {};
+  const auto patient = std::make_shared<Disk>();
+  const auto session = make(disk_, at_once), other = make(patient);
+  for (const auto& each : {session, other}) {
+    const auto reader = Watcher::of(*each, 0);
+    step(*each, 300).applied();
+    while (reader->read().frame->number < 300) {
+    }
+    step(*each, 1).applied();
+    EXPECT_EQ(*(each == session ? disk_ : patient)->past().reach.history_from,
+              each == session ? 300 : 0);
+    const auto slow = Watcher::of(*each, 100);
+    step(*each, 1).applied();
+    EXPECT_EQ(*(each == session ? disk_ : patient)->past().reach.history_from,
+              each == session ? 100 : 0);
+  }
+}
+
+TEST_F(SessionLogTest, KnowsWhatReadersHadOnceAllOfThemAreBack) {
+  const auto session = make(disk_);
+  const auto one = Watcher::of(*session, 0), two = Watcher::of(*session, 0);
+  step(*session, 300).applied();
+  while (disk_->past().reach.readers < 2) std::this_thread::yield();
+  const auto disk = std::make_shared<Disk>();
+  const auto again = make(disk, host());
+  ASSERT_TRUE(again->restore(disk_->past()));
+  const auto back = Watcher::of(*again, 290);
+  step(*again, 1).applied();
+  EXPECT_EQ(disk->past().reach.history_from, 0);
+  const auto later = Watcher::of(*again, 250);
+  step(*again, 1).applied();
+  EXPECT_EQ(disk->past().reach.history_from, 250);
 }
 
 TEST_F(SessionLogTest, ForgetsWhereReadersWereWhenTheyAreGone) {

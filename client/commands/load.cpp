@@ -8,7 +8,9 @@
 #include <tuple>
 
 #include "client/commands/commands.h"
+#include "client/exports/output_file.h"
 #include "client/input_file.h"
+#include "client/load/load_page.h"
 #include "client/output/status.h"
 #include "client/output/text.h"
 #include "client/scene_file.h"
@@ -28,6 +30,7 @@ struct LoadOptions {
   std::optional<double> target_s;
   std::string against;
   std::vector<std::string> compare;
+  std::string page;
 };
 
 constexpr std::array kQuantiles{std::pair{"p50", 0.5}, std::pair{"p90", 0.9},
@@ -208,7 +211,32 @@ class LoadView {
   std::chrono::steady_clock::time_point start_;
 };
 
-void load_once(Context& context, const LoadOrder& order, const std::string& against) {
+std::string asked_text(const LoadOrder& order) {
+  return fmt::format("{:g} frames/s of each session, {} of each", order.rate_per_s,
+                     count_of(order.subscribers, "subscriber"));
+}
+
+std::string sessions_text(const Json& load) {
+  return count_of(load.at("sessions").get<std::int64_t>(), "session");
+}
+
+// A page that is written once it is known; that it can be is known before.
+class Page {
+ public:
+  explicit Page(const std::string& path) {
+    if (!path.empty()) file_.emplace(path);
+  }
+  void write(const std::string& asked, const std::vector<NamedLoad>& loads) {
+    if (!file_) return;
+    file_->write(load_page(asked, loads));
+    file_->close();
+  }
+
+ private:
+  std::optional<OutputFile> file_;
+};
+
+void load_once(Context& context, const LoadOrder& order, const std::string& against, Page& page) {
   const std::optional<Json> before =
       against.empty() ? std::nullopt : std::optional(read_earlier(against));
   LoadView view(context, order);
@@ -218,7 +246,14 @@ void load_once(Context& context, const LoadOrder& order, const std::string& agai
   view.clear();
   const Json json = load_json(order, result);
   std::string text = load_text(order, result);
-  if (before) text += '\n' + change_text(*before, json);
+  std::vector<NamedLoad> loads;
+  if (before) {
+    text += '\n' + change_text(*before, json);
+    loads = {{"before", *before}, {"now", json}};
+  } else {
+    for (const Json& stage : json.at("stages")) loads.push_back({sessions_text(stage), stage});
+  }
+  page.write(asked_text(order), loads);
   context.answer(json, text);
   if (context.stop.stop_requested()) throw interrupted();
   if (!result.clean()) {
@@ -228,9 +263,11 @@ void load_once(Context& context, const LoadOrder& order, const std::string& agai
   }
 }
 
-void compare(Context& context, const std::vector<std::string>& paths) {
+void compare(Context& context, const std::vector<std::string>& paths, Page& page) {
   const Json before = read_earlier(paths[0]);
   const Json now = read_earlier(paths[1]);
+  page.write(fmt::format("before: {}, now: {}", paths[0], paths[1]),
+             {{"before", before}, {"now", now}});
   context.answer({{"before", before}, {"now", now}}, change_text(before, now));
 }
 
@@ -240,9 +277,10 @@ std::string why_not(const Probe& probe) {
   return probe.result.clean() ? "too late" : "frames lost or doubled";
 }
 
-void search_limit(Context& context, const LoadOrder& order, double target_s) {
+void search_limit(Context& context, const LoadOrder& order, double target_s, Page& page) {
   Table table({"SESSIONS", "P50", "P99", "MAX", "FRAMES/S", "OWN CPU", "HOLDS", "WHY NOT"});
   Json probes = Json::array();
+  std::vector<NamedLoad> loads;
   LoadView view(context, order);
   LimitSearch search;
   search.first = order.sessions;
@@ -253,6 +291,7 @@ void search_limit(Context& context, const LoadOrder& order, double target_s) {
     const Latencies& frame = probe.result.frame;
     Json json = load_json(tried_order, probe.result);
     json["holds"] = probe.holds;
+    loads.push_back({sessions_text(json) + (probe.holds ? "" : ", too many"), json});
     probes.push_back(std::move(json));
     table.add({std::to_string(probe.sessions), seconds_text(frame.quantile(0.5)),
                seconds_text(frame.quantile(0.99)), seconds_text(frame.quantile(1)),
@@ -265,6 +304,9 @@ void search_limit(Context& context, const LoadOrder& order, double target_s) {
                  [&](int sessions, const LoadResult& so_far) { view.show(sessions, so_far); });
   view.clear();
   if (context.stop.stop_requested()) throw interrupted();
+  page.write(fmt::format("{}: {} hold with 99 % within {}", asked_text(order),
+                         count_of(limit, "session"), seconds_text(target_s)),
+             loads);
   context.answer({{"limit", limit}, {"target_s", target_s}, {"probes", std::move(probes)}},
                  fmt::format("{}\n{} hold {:g} frames/s with 99 % within {}\n", table.text(),
                              count_of(limit, "session"), order.rate_per_s, seconds_text(target_s)));
@@ -295,7 +337,8 @@ void check_stages(const LoadOrder& order) {
 }
 
 void run_load(Context& context, const LoadOptions& options) {
-  if (!options.compare.empty()) return compare(context, options.compare);
+  Page page(options.page);
+  if (!options.compare.empty()) return compare(context, options.compare, page);
   LoadOrder order = options.order;
   check_stages(order);
   if (order.drive == Drive::kFree && options.find_limit)
@@ -321,8 +364,8 @@ void run_load(Context& context, const LoadOptions& options) {
                     order.rate_per_s, seconds_text(frame_step_s), time_scale));
   }
   if (options.find_limit)
-    return search_limit(context, order, options.target_s.value_or(1 / order.rate_per_s));
-  load_once(context, order, options.against);
+    return search_limit(context, order, options.target_s.value_or(1 / order.rate_per_s), page);
+  load_once(context, order, options.against, page);
 }
 
 constexpr const char* kLoadFooter =
@@ -397,6 +440,8 @@ void add_load(CLI::App& app, Context& context) {
   command->add_option("--compare", options->compare, "Load nothing; compare two answers to --json")
       ->type_name("BEFORE AFTER")
       ->expected(2);
+  command->add_option("-o,--output", options->page, "HTML page with all of it as curves too")
+      ->type_name("PATH");
   command->footer(kLoadFooter);
   command->callback([&context, options] { run_load(context, *options); });
 }

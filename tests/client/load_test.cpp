@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "client/connection.h"
+#include "client/input_file.h"
 #include "tests/client/breaking_proxy.h"
 #include "tests/client/client_test.h"
 
@@ -16,6 +17,7 @@ using client::Drive;
 using client::Latencies;
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 using LoadTest = ClientTest;
 
@@ -185,6 +187,29 @@ TEST_F(LoadTest, IsComparedWithAnEarlierOne) {
   EXPECT_THAT(files.out, HasSubstr("frame p99"));
   write_file(path("other.json"), R"({"frames": 3})");
   EXPECT_EQ(with({"--against", path("other.json")}).exit, 4);
+}
+
+TEST_F(LoadTest, IsWrittenAsAPageThatAsksForNothing) {
+  const std::string page = path("load.html"), before = path("before.json");
+  const std::vector<std::string> load{"load",   "--scene", scene_file(small_scene()),
+                                      "--ramp", "0.05",    "--duration",
+                                      "0.3",    "--rate",  "100"};
+  auto stages = load;
+  stages.insert(stages.end(), {"--stages", "1,3", "-o", page});
+  write_file(before, ask(stages).dump());
+  const std::string text = client::read_text(page);
+  EXPECT_THAT(text, HasSubstr("<td>1 session</td>"));
+  EXPECT_THAT(text, HasSubstr("<td>3 sessions</td>"));
+  EXPECT_THAT(text, HasSubstr("How late frames came"));
+  EXPECT_THAT(text, HasSubstr("Lateness of frames"));
+  EXPECT_THAT(text, Not(HasSubstr("<script")));
+  EXPECT_THAT(text, Not(HasSubstr("href")));
+  ask({"load", "--compare", before, before, "-o", page});
+  EXPECT_THAT(client::read_text(page), HasSubstr("<td>now</td>"));
+
+  auto nowhere = load;
+  nowhere.insert(nowhere.end(), {"-o", path("gone/load.html")});
+  EXPECT_THAT(weft(nowhere).err, HasSubstr("gone/load.html"));
 }
 
 TEST_F(LoadTest, AStopEndsItAndItsSessions) {

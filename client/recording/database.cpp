@@ -23,7 +23,7 @@ constexpr int kBusyTimeoutMs = 30'000;
     case SQLITE_NOTADB:
       throw malformed(path, "not a recording of weft");
     case SQLITE_CORRUPT:
-      throw damaged(path, sqlite3_errmsg(database));
+      throw damaged(path, "it is cut short or written over; copy it again from where it was made");
     case SQLITE_FULL:
       throw unwritable(path, "the disk is full");
     case SQLITE_IOERR:

@@ -340,6 +340,14 @@ TEST_F(RecordingTest, GivesWhatWasWrittenOrAnErrorWhereverItIsCut) {
   }
 }
 
+TEST_F(RecordingTest, SaysWhatToDoWithOneThatIsCutShort) {
+  ask({"record", "cloth", "--run", "--to", "60", "-o", file_});
+  std::filesystem::resize_file(file_, std::filesystem::file_size(file_) / 2);
+  const Outcome info = weft({"info", file_});
+  EXPECT_EQ(info.exit, 4);
+  EXPECT_THAT(info.err, AllOf(HasSubstr("cut short"), HasSubstr("copy it again")));
+}
+
 TEST_F(RecordingTest, VerifySaysThatAllIsAsItWasWritten) {
   ask({"record", "cloth", "--run", "--to", "60", "-o", file_});
   const Outcome verified = weft({"verify", file_});

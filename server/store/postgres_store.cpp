@@ -107,6 +107,7 @@ class PostgresStore final : public SessionStore {
   std::int64_t number_ = 0;  // of this process among all replicas
   Tenures tenures_;
   PostgresConnection log_, calls_, lease_;
+  std::mutex losing_;
   std::mutex mutex_;
   Watch watch_;  // guarded by mutex_
   WriteQueue<Job> writes_{[this](std::deque<Job> jobs) { commit(std::move(jobs)); }};
@@ -297,8 +298,10 @@ void PostgresStore::finish(const Job& job, const std::string& error, bool own) {
   job.written(own ? error : "another server has the session");
 }
 
-// Another server has it, or none.
+// Another server has it, or none. Returns after `taken`, whoever is first to see it: what is
+// refused then is known to be elsewhere.
 void PostgresStore::lose(const std::string& uid) {
+  const std::lock_guard one_at_a_time(losing_);
   if (!tenures_.erase(uid)) return;
   std::function<void(const std::string&)> taken;
   {

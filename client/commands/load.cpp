@@ -183,7 +183,9 @@ std::string change_text(const Json& before, const Json& now) {
 
 Json read_earlier(const std::string& path) try {
   Json json = Json::parse(read_text(path));
-  std::ignore = change_text(json, json);  // has all that is compared
+  // has all that is compared and drawn
+  std::ignore = change_text(json, json);
+  std::ignore = load_page(path, {{path, json}});
   return json;
 } catch (const Json::exception&) {
   throw malformed(path, "this is not what weft load --json answers");
@@ -280,7 +282,6 @@ std::string why_not(const Probe& probe) {
 void search_limit(Context& context, const LoadOrder& order, double target_s, Page& page) {
   Table table({"SESSIONS", "P50", "P99", "MAX", "FRAMES/S", "OWN CPU", "HOLDS", "WHY NOT"});
   Json probes = Json::array();
-  std::vector<NamedLoad> loads;
   LoadView view(context, order);
   LimitSearch search;
   search.first = order.sessions;
@@ -291,7 +292,6 @@ void search_limit(Context& context, const LoadOrder& order, double target_s, Pag
     const Latencies& frame = probe.result.frame;
     Json json = load_json(tried_order, probe.result);
     json["holds"] = probe.holds;
-    loads.push_back({sessions_text(json) + (probe.holds ? "" : ", too many"), json});
     probes.push_back(std::move(json));
     table.add({std::to_string(probe.sessions), seconds_text(frame.quantile(0.5)),
                seconds_text(frame.quantile(0.99)), seconds_text(frame.quantile(1)),
@@ -304,6 +304,9 @@ void search_limit(Context& context, const LoadOrder& order, double target_s, Pag
                  [&](int sessions, const LoadResult& so_far) { view.show(sessions, so_far); });
   view.clear();
   if (context.stop.stop_requested()) throw interrupted();
+  std::vector<NamedLoad> loads;
+  for (const Json& probe : probes)
+    loads.push_back({sessions_text(probe) + (probe.at("holds") ? "" : ", too many"), probe});
   page.write(fmt::format("{}: {} hold with 99 % within {}", asked_text(order),
                          count_of(limit, "session"), seconds_text(target_s)),
              loads);

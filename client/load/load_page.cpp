@@ -91,7 +91,7 @@ std::string load_page(const std::string& asked, const std::vector<NamedLoad>& lo
       "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n"
       "<meta name=\"viewport\" content=\"width=device-width\">\n<title>Weft under load</title>\n"
       "<style>{}</style>\n<h1>Weft under load</h1>\n<p>{}</p>\n{}",
-      kStyle, asked, table(loads));
+      kStyle, escaped(asked), table(loads));
   const bool is_timed = std::all_of(loads.begin(), loads.end(), [](const NamedLoad& load) {
     return load.figures.at("frame_s").at("count") != 0;
   });

@@ -16,20 +16,6 @@ constexpr double kLeft = 80, kRight = 224,  // the names stand there
 constexpr std::array kColours = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd",
                                  "#ff7f0e", "#17becf", "#8c564b", "#7f7f7f"};
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&') {
-      out += "&amp;";
-    } else if (c == '<') {
-      out += "&lt;";
-    } else {
-      out += c;
-    }
-  }
-  return out;
-}
-
 // A range, and places in it at 1, 2 or 5 times a power of ten; of a logarithm: at the powers
 // themselves, between them too where they are few.
 struct Axis {
@@ -108,6 +94,20 @@ Plot drawn(Plot plot) {
 }
 
 }  // namespace
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '&') {
+      out += "&amp;";
+    } else if (c == '<') {
+      out += "&lt;";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
 
 std::string svg_text(const Plot& given) {
   const Plot plot = drawn(given);

@@ -22,6 +22,8 @@ struct Plot {
 };
 
 inline constexpr int kPlotWidth = 920, kPlotHeight = 480;
+// As it stands in XML or HTML.
+std::string escaped(const std::string& text);
 // The plot as an SVG document of that size.
 std::string svg_text(const Plot& given);
 

@@ -13,7 +13,7 @@
 namespace weft {
 namespace {
 
-// Scenes of more particles take longer than a tenth of a second to plan.
+// So many particles are planned within a tenth of a second.
 constexpr std::int64_t kLarge = 4096;
 
 // Without sheets that are larger than any that is simulated.

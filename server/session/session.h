@@ -231,6 +231,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::int64_t reach_after(const Event& event) const;
   std::int64_t ahead_of(std::optional<double> time_scale) const;
   bool reach_suffices();
+  int holders();
+  void forget_past_holders();
   bool is_recorded() const;
   bool has_readers() const;
   int readers() const;

@@ -20,7 +20,7 @@ Outcome kills(Form form) {
   constexpr double kLongestResume = 2;  // s, 95 of 100
   const int kills = form == Form::kShort ? 5 : 200;
   const v1::Scene scene = client::make_template("load", {.rows = 8, .columns = 8});
-  Weftd weftd({"--snapshot-ms", "20"});  // what comes after the last one is computed again
+  Weftd weftd({"--snapshot-ms", "20"});  // each restart begins at the last one
   const auto connection = weftd.connect();
   Hearing hearing(4);
   std::vector<Recorded> all = record_sessions(weftd.path(""), *connection, scene, hearing);

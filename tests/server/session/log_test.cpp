@@ -5,6 +5,7 @@
 #include <atomic>
 #include <map>
 #include <thread>
+#include <tuple>
 
 #include "tests/server/session/session_support.h"
 
@@ -442,19 +443,18 @@ TEST_F(SessionLogTest, SaysWhatReadersMayWantAgainAndNoMore) {
   SessionHost at_once = host();
   at_once.return_time = {};
   const auto patient = std::make_shared<Disk>();
-  const auto session = make(disk_, at_once), other = make(patient);
-  for (const auto& each : {session, other}) {
-    const auto reader = Watcher::of(*each, 0);
-    step(*each, 300).applied();
+  for (const auto& [session, disk, read, wanted] :
+       {std::tuple{make(disk_, at_once), disk_, 300, 100},
+        std::tuple{make(patient), patient, 0, 0}}) {
+    const auto reader = Watcher::of(*session, 0);
+    step(*session, 300).applied();
     while (reader->read().frame->number < 300) {
     }
-    step(*each, 1).applied();
-    EXPECT_EQ(*(each == session ? disk_ : patient)->past().reach.history_from,
-              each == session ? 300 : 0);
-    const auto slow = Watcher::of(*each, 100);
-    step(*each, 1).applied();
-    EXPECT_EQ(*(each == session ? disk_ : patient)->past().reach.history_from,
-              each == session ? 100 : 0);
+    step(*session, 1).applied();
+    EXPECT_EQ(disk->past().reach.history_from, read);
+    const auto slow = Watcher::of(*session, 100);
+    step(*session, 1).applied();
+    EXPECT_EQ(disk->past().reach.history_from, wanted);
   }
 }
 
@@ -464,7 +464,7 @@ TEST_F(SessionLogTest, KnowsWhatReadersHadOnceAllOfThemAreBack) {
   step(*session, 300).applied();
   while (disk_->past().reach.readers < 2) std::this_thread::yield();
   const auto disk = std::make_shared<Disk>();
-  const auto again = make(disk, host());
+  const auto again = make(disk);
   ASSERT_TRUE(again->restore(disk_->past()));
   const auto back = Watcher::of(*again, 290);
   step(*again, 1).applied();

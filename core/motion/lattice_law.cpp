@@ -23,6 +23,7 @@ BendLaw<T> bend_law(const BendingForce& force, int terms, double share) {
     double to_index = terms;
     for (std::size_t k = 0; k < law.to_index.size(); ++k)
       law.to_index[k] = static_cast<T>((to_index /= length) * line->breakpoints()[k]);
+    law.half_segment = static_cast<T>(length / (2 * terms));
     for (std::size_t i = 0; i < line->segments().size(); ++i) {
       law.intercepts.data()[i] = static_cast<T>(scale * line->segments()[i].intercept);
       law.slopes.data()[i] = static_cast<T>(scale / length * line->segments()[i].slope);

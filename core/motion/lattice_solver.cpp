@@ -46,8 +46,8 @@ class LatticeSolver : public SheetSolver {
       set_position(at, x.col(i));
       set_displacement(at, v.col(i) * dt - a.col(i) * (dt * dt / 2));
       for (int axis = 0; axis < 3; ++axis)
-        value(State::kW + axis, at) = static_cast<T>(v(axis, i) * 2 * dt);
-      value(State::kStep2, at) = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
+        at[State::kW + axis] = static_cast<T>(v(axis, i) * 2 * dt);
+      at[State::kStep2] = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
     });
     std::fill(gap_.begin(), gap_.end(), 0);
     least_gap_ = come_ = 0;
@@ -69,10 +69,10 @@ class LatticeSolver : public SheetSolver {
   }
 
   void lead(int particle, const Vector3d& x, const Vector3d& d) override {
-    const Place at{particle / columns_, particle % columns_};
+    const Place at = state_.place(particle / columns_, particle % columns_);
     set_position(at, x);
     for (int axis = 0; axis < 3; ++axis)
-      value(State::kW + axis, at) = static_cast<T>(3 * d[axis]) - value(State::kD + axis, at);
+      at[State::kW + axis] = static_cast<T>(3 * d[axis]) - at[State::kD + axis];
     set_displacement(at, d);
   }
 
@@ -111,13 +111,12 @@ class LatticeSolver : public SheetSolver {
 
   void positions(Matrix3Xd& x) const override {
     x.resize(3, particles_);
-    for_each_particle([&](int i, Place at) { x.col(i) = position(at); });
+    for_each_particle([&](int i, ConstPlace at) { x.col(i) = position(at); });
   }
   void velocities(Matrix3Xd& v) const override {
     v.resize(3, particles_);
-    for_each_particle([&](int i, Place at) {
-      for (int axis = 0; axis < 3; ++axis)
-        v(axis, i) = double{value(State::kW + axis, at)} / (2 * dt_);
+    for_each_particle([&](int i, ConstPlace at) {
+      for (int axis = 0; axis < 3; ++axis) v(axis, i) = double{at[State::kW + axis]} / (2 * dt_);
     });
   }
   // v = d / dt + a dt / 2: d stands for the velocity half a step ago
@@ -126,8 +125,8 @@ class LatticeSolver : public SheetSolver {
     positions(x);
     velocities(v);
     accelerate(dynamics_, time, x, v, a);
-    for_each_particle(
-        [&](int i, Place at) { v.col(i) = displacement(at) / dt_ + a.col(i) * (dt_ / 2); });
+    visit(std::as_const(state_),
+          [&](int i, ConstPlace at) { v.col(i) = displacement(at) / dt_ + a.col(i) * (dt_ / 2); });
   }
 
   std::string save() const override {
@@ -138,7 +137,7 @@ class LatticeSolver : public SheetSolver {
     saved.put(come_);
     saved.put(gap_.data(), gap_.size());
     for (int plane = 0; plane < state_.planes(); ++plane)
-      for_each_particle([&](int, Place at) { saved.put(value(plane, at)); });
+      for_each_particle([&](int, ConstPlace at) { saved.put(at[plane]); });
     return saved.bytes();
   }
   bool load(const std::string& saved) override {
@@ -153,7 +152,7 @@ class LatticeSolver : public SheetSolver {
     loaded.take(gap_.data(), gap_.size());
     least_gap_ = *std::min_element(gap_.begin(), gap_.end());
     for (int plane = 0; plane < state_.planes(); ++plane)
-      for_each_particle([&](int, Place at) { loaded.take(&value(plane, at), 1); });
+      for_each_particle([&](int, Place at) { loaded.take(&at[plane], 1); });
     return loaded.all_taken();
   }
 
@@ -165,33 +164,38 @@ class LatticeSolver : public SheetSolver {
 
   int bands(const Crew& crew) const { return std::min(crew.hands(), most_hands()); }
 
-  struct Place {
-    int row, column;
-  };
+  using Place = typename State::Place;
+  using ConstPlace = typename State::ConstPlace;
+  template <class F>
+  void for_each_particle(const F& f) {
+    visit(state_, f);
+  }
   template <class F>
   void for_each_particle(const F& f) const {
-    for (int r = 0, i = 0; r < law_.layout.rows; ++r)
-      for (int c = 0; c < columns_; ++c, ++i) f(i, Place{r, c});
+    visit(state_, f);
   }
-  T& value(int plane, Place at) { return state_.at(plane, at.row, at.column); }
-  const T& value(int plane, Place at) const { return state_.at(plane, at.row, at.column); }
+  template <class S, class F>
+  void visit(S& state, const F& f) const {
+    for (int r = 0, i = 0; r < law_.layout.rows; ++r)
+      for (int c = 0; c < columns_; ++c, ++i) f(i, state.place(r, c));
+  }
 
-  Vector3d exact(int plane, int error, Place at) const {
+  Vector3d exact(int plane, int error, ConstPlace at) const {
     Vector3d out;
     for (int axis = 0; axis < 3; ++axis) {
-      out[axis] = value(plane + axis, at);
-      if (law_.compensated) out[axis] -= double{value(error + axis, at)};
+      out[axis] = at[plane + axis];
+      if (law_.compensated) out[axis] -= double{at[error + axis]};
     }
     return out;
   }
   void set(int plane, int error, Place at, const Vector3d& exact) {
     for (int axis = 0; axis < 3; ++axis) {
-      const T rounded = value(plane + axis, at) = static_cast<T>(exact[axis]);
-      if (law_.compensated) value(error + axis, at) = static_cast<T>(double{rounded} - exact[axis]);
+      const T rounded = at[plane + axis] = static_cast<T>(exact[axis]);
+      if (law_.compensated) at[error + axis] = static_cast<T>(double{rounded} - exact[axis]);
     }
   }
-  Vector3d position(Place at) const { return origin_ + exact(State::kX, State::kXError, at); }
-  Vector3d displacement(Place at) const { return exact(State::kD, State::kDError, at); }
+  Vector3d position(ConstPlace at) const { return origin_ + exact(State::kX, State::kXError, at); }
+  Vector3d displacement(ConstPlace at) const { return exact(State::kD, State::kDError, at); }
   void set_position(Place at, const Vector3d& x) {
     set(State::kX, State::kXError, at, x - origin_);
   }

@@ -80,6 +80,8 @@ class Sweep {
   static constexpr int kPart = static_cast<int>(hn::MaxLanes(D()));  // what this target takes
   static constexpr bool kIsometric = kBend == BendKind::kIsometric;
   static constexpr bool kInterlaced = !kIsometric && kBend != BendKind::kNone;
+  // Whether connection 6 begins the sum of forces on its end, so that none has to be set to 0.
+  static constexpr bool kStartsRows = kInterlaced && kBendsDiagonal;
 
   // From one vector to the next, of forces on the rows r, r + 1, r + 2, with a halo; of what row
   // r + 3 has heard, and row r + 4, for its damping; of what is seen.
@@ -109,6 +111,7 @@ class Sweep {
   // On one vector of each of the rows r, r + 1, r + 2.
   struct Forces {
     Triple<V> own, next, after;
+    Triple<V> beside;  // right of next, until all that goes there is added
   };
 
   // A vector of the halo, that which it continues, and by how many lanes it is shifted against
@@ -205,6 +208,7 @@ class Sweep {
     T *force = forces(r), *force1 = forces(r + 1), *force2 = forces(r + 2), *heard = heard_;
     T* own = state_.own(std::max(r, band_.first));
     const T* columns = law_.columns.data();
+    if constexpr (kStartsRows) std::fill_n(force2, 2 * kForces, T(0));
     for (int j = 0; j < vectors_; ++j) {
 #pragma GCC unroll 1
       for (int part = 0; part < kLanes; part += kPart) {
@@ -237,7 +241,7 @@ class Sweep {
                       heard_ + j * kHeard + part,
                       nullptr,
                       law_.columns.data() + j * kColumnPlanes * kLanes + part};
-        Forces f{zero(), zero(), load(force)};
+        Forces f{zero(), zero(), load(force), zero()};
         damp<true>(row, p, f);
         store(f.after, force);
       }
@@ -245,8 +249,8 @@ class Sweep {
 
   template <bool kBorder>
   HWY_INLINE void sweep_vector(const Row& row, const Place& p) {
-    Forces f{load(p.force), load(p.force1), load(p.force2)};
-    store(zero(), p.force);  // for row r + 3
+    Forces f{load(p.force), load(p.force1), load(p.force2), zero()};
+    if constexpr (!kStartsRows) store(zero(), p.force);  // for row r + 3
     if (law_.damping > 0 && row.after) damp<kBorder>(row, p, f);
     add_springs<kBorder>(row, p, f, connections());
     if constexpr (kIsometric) add_isometric<kBorder>(row, p, f);
@@ -292,7 +296,14 @@ class Sweep {
       end = plus_times(end, apart, pull);
     } else {
       T* const end = (c.to == 1 ? p.force1 : p.force2) + c.right * kForces;
-      store(plus_times(load(end), apart, pull), end);
+      if constexpr (k == 0 && kShears)  // connection 2 has the same end
+        f.beside = plus_times(load(end), apart, pull);
+      else if constexpr (k == 2)
+        store(plus_times(f.beside, apart, pull), end);
+      else if constexpr (k == 6 && kStartsRows)
+        store(times(apart, pull), end);
+      else
+        store(plus_times(load(end), apart, pull), end);
     }
   }
 

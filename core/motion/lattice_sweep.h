@@ -67,7 +67,8 @@ struct BendLaw {
   T clamp_rest = 0;  // c_b L, N
   // l (t0 + l (t1 + ...)): the segment that l lies in; or t0 = 2 / L of a polynomial in 2 r - 1
   std::array<T, 4> to_index{};
-  T last = 0;  // the last segment
+  T half_segment = 0;  // of equal ones, m
+  T last = 0;          // the last segment
   // f_b = intercept + slope l of each segment (N, N/m), 32 at least, or the polynomial's
   // coefficients, highest power first (N)
   AlignedArray<T> intercepts, slopes;
@@ -169,15 +170,26 @@ class SweepState {
   T* seen(int r) { return seen_.data() + kMargin + r * seen_row(); }
   T* own(int r) { return own_.data() + r * own_row(); }
 
+  // A particle's values, by plane.
+  template <class Value>
+  struct Of {
+    Value *seen, *own;
+    Value& operator[](int plane) const {
+      return (plane < kSeen ? seen : own)[plane * LatticeLayout<T>::kLanes];
+    }
+  };
+  using Place = Of<T>;
+  using ConstPlace = Of<const T>;
   // Column c of row r; also columns beyond the last, as far as vectors reach.
-  T& at(int plane, int r, int c) {
+  Place place(int r, int c) {
     const Column& column = columns_[static_cast<std::size_t>(c)];
-    T* const vector = plane < kSeen ? seen(r) + column.seen : own(r) + column.own;
-    return vector[plane * LatticeLayout<T>::kLanes];
+    return {seen(r) + column.seen, own(r) + column.own};
   }
-  const T& at(int plane, int r, int c) const {
-    return const_cast<SweepState*>(this)->at(plane, r, c);
+  ConstPlace place(int r, int c) const {
+    const Place place = const_cast<SweepState*>(this)->place(r, c);
+    return {place.seen, place.own};
   }
+  T& at(int plane, int r, int c) { return place(r, c)[plane]; }
 
   // Divides the sheet as it is now into so many bands, which may be swept at the same time.
   std::vector<SweepBand<T>>& divide(int bands);

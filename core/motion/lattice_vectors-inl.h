@@ -75,18 +75,30 @@ HWY_INLINE auto each(const F& f, const Each<A, N>& a, const B&... b) {
   return each_of(f, std::make_index_sequence<N>(), a, b...);
 }
 
-// 1 / sqrt(v) from an integer start, unlike the processors' own approximations with equal bits
-// everywhere. Finite at 0. First a Newton step with constants fitted to the start (J. Kadlec),
-// right to 6.5e-4, then one of third order, in double another one of second.
+// 1 / sqrt(1 - e), to 1.1e-8 in single and 2.9e-10 in double precision where the start leaves it:
+// minimax, highest power first, in c - v s^2 for c in the middle of the start's 3/4 ... 27/32.
+inline constexpr double kCentre = 0.796875;
+template <class T>
+constexpr auto inverse_sqrt_polynomial() {
+  if constexpr (sizeof(T) == 4)
+    return std::array{0.76284469835884661, 0.69416965332035785, 0.66153688843579361,
+                      0.70288438952739762, 1.1202240675213873};
+  else
+    return std::array{0.86232574451111188, 0.76289427998580939, 0.69180123460826881,
+                      0.66153677950956102, 0.70288569050604333, 1.1202240675512909};
+}
+
+// 1 / sqrt(v) from an integer start s, unlike the processors' own approximations with equal bits
+// everywhere; then a polynomial, and in double a Newton step. Finite at 0.
 template <class D, std::size_t N, class V = hn::Vec<D>>
 HWY_INLINE Each<V, N> inverse_sqrt(D d, const Each<V, N>& v) {
   using T = hn::TFromD<D>;
   const hn::RebindToUnsigned<D> du;
   using U = hn::TFromD<decltype(du)>;
   constexpr bool kSingle = sizeof(T) == 4;
-  constexpr double kScale = 0.703952253, kFirst = 2.38924456;
+  constexpr auto kPolynomial = inverse_sqrt_polynomial<T>();
   const auto set = [&](double value) HWY_ATTR { return hn::Set(d, static_cast<T>(value)); };
-  const auto magic = hn::Set(du, static_cast<U>(kSingle ? 0x5f1ffff9u : 0x5fe3ffff20000000u));
+  const auto magic = hn::Set(du, static_cast<U>(kSingle ? 0x5f200000u : 0x5fe4000000000000u));
   const auto mul = [](V a, V b) HWY_ATTR { return hn::Mul(a, b); };
 
   const auto start = each(
@@ -94,25 +106,22 @@ HWY_INLINE Each<V, N> inverse_sqrt(D d, const Each<V, N>& v) {
         return hn::BitCast(d, hn::Sub(magic, hn::ShiftRight<1>(hn::BitCast(du, a))));
       },
       v);
-  const V first = set(kFirst);
-  auto vy = each(mul, v, start);
-  auto h = each([&](V a, V y) HWY_ATTR { return hn::NegMulAdd(a, y, first); }, vy, start);
-  auto y = each(mul, start, h);  // kScale y is near 1 / sqrt(v)
-
-  const V one = set(1 / (kScale * kScale));
-  const V linear = set(kScale * kScale * kScale / 2);
-  const V square = set(kScale * kScale * kScale * kScale * kScale * 3 / 8);
-  const V constant = set(kScale);
-  vy = each(mul, v, y);
-  h = each([&](V a, V b) HWY_ATTR { return hn::NegMulAdd(a, b, one); }, vy, y);
-  auto p = each([&](V a) HWY_ATTR { return hn::MulAdd(a, square, linear); }, h);
-  p = each([&](V a, V b) HWY_ATTR { return hn::MulAdd(a, b, constant); }, h, p);
-  y = each(mul, y, p);
+  const V centre = set(kCentre);
+  const auto vs = each(mul, v, start);
+  const auto e = each([&](V a, V s) HWY_ATTR { return hn::NegMulAdd(a, s, centre); }, vs, start);
+  const V first = set(kPolynomial[0]), second = set(kPolynomial[1]);
+  auto p = each([&](V a) HWY_ATTR { return hn::MulAdd(a, first, second); }, e);
+  for (std::size_t k = 2; k < kPolynomial.size(); ++k) {
+    const V next = set(kPolynomial[k]);
+    p = each([&](V a, V b) HWY_ATTR { return hn::MulAdd(a, b, next); }, e, p);
+  }
+  auto y = each(mul, start, p);
   if constexpr (!kSingle) {
-    vy = each(mul, v, y);
-    h = each([&](V a, V b) HWY_ATTR { return hn::NegMulAdd(a, b, set(1)); }, vy, y);
-    p = each([&](V a) HWY_ATTR { return hn::Mul(a, set(0.5)); }, y);
-    y = each([](V a, V b, V c) HWY_ATTR { return hn::MulAdd(a, b, c); }, p, h, y);
+    const V one = set(1), half = set(0.5);
+    const auto vy = each(mul, v, y);
+    const auto rest = each([&](V a, V b) HWY_ATTR { return hn::NegMulAdd(a, b, one); }, vy, y);
+    p = each([&](V a) HWY_ATTR { return hn::Mul(a, half); }, y);
+    y = each([](V a, V b, V c) HWY_ATTR { return hn::MulAdd(a, b, c); }, p, rest, y);
   }
   return y;
 }
@@ -137,15 +146,32 @@ HWY_INLINE V look_up(D d, const hn::TFromD<D>* table, I i) {
   return hn::Load(d, values);
 }
 
+// Of 32 equal segments, the number of that whose middle lies this far beyond the first one's: in
+// the lowest bits of a value so large that it holds no fraction.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V nearest_middle(D d, const BendLaw<hn::TFromD<D>>& law, V beyond) {
+  using T = hn::TFromD<D>;
+  constexpr T kWhole = sizeof(T) == 4 ? T(0x1.8p23) : T(0x1.8p52);
+  return hn::MulAdd(beyond, hn::Set(d, law.to_index[0]), hn::Set(d, kWhole));
+}
+
 // Where in its table or polynomial a length lies.
 template <BendKind kKind, class D, class V = hn::Vec<D>>
 HWY_INLINE V place(D d, const BendLaw<hn::TFromD<D>>& law, V l) {
   const auto& t = law.to_index;
-  if constexpr (kKind == BendKind::kTable32 || kKind == BendKind::kPolynomial)
-    return hn::Mul(l, hn::Set(d, t[0]));
+  if constexpr (kKind == BendKind::kTable32)
+    return nearest_middle(d, law, hn::Sub(l, hn::Set(d, law.half_segment)));
+  if constexpr (kKind == BendKind::kPolynomial) return hn::Mul(l, hn::Set(d, t[0]));
   V sum = hn::MulAdd(l, hn::Set(d, t[3]), hn::Set(d, t[2]));
   sum = hn::MulAdd(l, sum, hn::Set(d, t[1]));
   return hn::Mul(l, hn::MulAdd(l, sum, hn::Set(d, t[0])));
+}
+// The same of a length a b.
+template <BendKind kKind, class D, class V = hn::Vec<D>>
+HWY_INLINE V place(D d, const BendLaw<hn::TFromD<D>>& law, V a, V b) {
+  if constexpr (kKind == BendKind::kTable32)
+    return nearest_middle(d, law, hn::MulSub(a, b, hn::Set(d, law.half_segment)));
+  return place<kKind>(d, law, hn::Mul(a, b));
 }
 
 // intercept / l + slope of the segment that `at` lies in. A table of 32 repeats itself: a length
@@ -155,17 +181,18 @@ HWY_INLINE V line(D d, const BendLaw<hn::TFromD<D>>& law, V at, V y) {
   using T = hn::TFromD<D>;
   const T* const a = law.intercepts.data();
   const T* const b = law.slopes.data();
-  constexpr bool k32 = kKind == BendKind::kTable32 || kKind == BendKind::kOptimalTable32;
+  constexpr bool kEqual = kKind == BendKind::kTable32;
+  constexpr bool k32 = kEqual || kKind == BendKind::kOptimalTable32;
 #if HWY_TARGET == HWY_AVX3
   if constexpr (k32 && sizeof(T) == 4) {
-    const __m512i i = _mm512_cvttps_epi32(at.raw);
+    const __m512i i = kEqual ? _mm512_castps_si512(at.raw) : _mm512_cvttps_epi32(at.raw);
     const auto pick = [&](const T* table) HWY_ATTR {
       return V{_mm512_permutex2var_ps(hn::Load(d, table).raw, i, hn::Load(d, table + 16).raw)};
     };
     return hn::MulAdd(pick(a), y, pick(b));
   }
   if constexpr (k32 && sizeof(T) == 8) {
-    const __m512i i = _mm512_cvttpd_epi64(at.raw);
+    const __m512i i = kEqual ? _mm512_castpd_si512(at.raw) : _mm512_cvttpd_epi64(at.raw);
     const __mmask8 upper = _mm512_test_epi64_mask(i, _mm512_set1_epi64(16));
     const auto pick = [&](const T* table) HWY_ATTR {
       const auto half = [&](const T* from) HWY_ATTR {
@@ -178,7 +205,7 @@ HWY_INLINE V line(D d, const BendLaw<hn::TFromD<D>>& law, V at, V y) {
 #endif
 #if HWY_TARGET == HWY_AVX2
   if constexpr (k32 && sizeof(T) == 4) {
-    const __m256i i = _mm256_cvttps_epi32(at.raw);
+    const __m256i i = kEqual ? _mm256_castps_si256(at.raw) : _mm256_cvttps_epi32(at.raw);
     const __m256 bit3 = _mm256_castsi256_ps(_mm256_slli_epi32(i, 28));
     const __m256 bit4 = _mm256_castsi256_ps(_mm256_slli_epi32(i, 27));
     const auto pick = [&](const T* table) HWY_ATTR {
@@ -195,7 +222,7 @@ HWY_INLINE V line(D d, const BendLaw<hn::TFromD<D>>& law, V at, V y) {
   const hn::RebindToSigned<D> di;
   auto i = hn::Zero(di);
   if constexpr (k32) {
-    i = hn::And(hn::ConvertTo(di, at), hn::Set(di, 31));
+    i = hn::And(kEqual ? hn::BitCast(di, at) : hn::ConvertTo(di, at), hn::Set(di, 31));
   } else {
     const V last = hn::Set(d, law.last);
     at = hn::IfThenElse(hn::Lt(at, last), at, last);  // NaN: the last
@@ -217,7 +244,7 @@ HWY_INLINE V polynomial(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V at)
 // max(f_b, c_b (l - L)) / l where negative, N/m (eq. 3 to 5); y = 1 / l.
 template <BendKind kKind, class D, class V = hn::Vec<D>>
 HWY_INLINE V bend(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V l2, V y) {
-  const V at = place<kKind>(d, law, hn::Mul(l2, y));
+  const V at = place<kKind>(d, law, l2, y);
   V f = hn::Zero(d);
   if constexpr (kKind == BendKind::kPolynomial)
     f = hn::Mul(polynomial(d, law, terms, at), y);

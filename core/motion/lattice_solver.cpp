@@ -111,12 +111,16 @@ class LatticeSolver : public SheetSolver {
 
   void positions(Matrix3Xd& x) const override {
     x.resize(3, particles_);
-    for_each_particle([&](int i, ConstPlace at) { x.col(i) = position(at); });
+    for_each_particle([&](int i, ConstPlace at) {
+      for (int axis = 0; axis < 3; ++axis)
+        x(axis, i) = origin_[axis] + exact(State::kX + axis, State::kXError + axis, at);
+    });
   }
   void velocities(Matrix3Xd& v) const override {
     v.resize(3, particles_);
+    const double scale = 1 / (2 * dt_);
     for_each_particle([&](int i, ConstPlace at) {
-      for (int axis = 0; axis < 3; ++axis) v(axis, i) = double{at[State::kW + axis]} / (2 * dt_);
+      for (int axis = 0; axis < 3; ++axis) v(axis, i) = scale * double{at[State::kW + axis]};
     });
   }
   // v = d / dt + a dt / 2: d stands for the velocity half a step ago
@@ -125,8 +129,11 @@ class LatticeSolver : public SheetSolver {
     positions(x);
     velocities(v);
     accelerate(dynamics_, time, x, v, a);
-    visit(std::as_const(state_),
-          [&](int i, ConstPlace at) { v.col(i) = displacement(at) / dt_ + a.col(i) * (dt_ / 2); });
+    visit(std::as_const(state_), [&](int i, ConstPlace at) {
+      for (int axis = 0; axis < 3; ++axis)
+        v(axis, i) =
+            exact(State::kD + axis, State::kDError + axis, at) / dt_ + a(axis, i) * (dt_ / 2);
+    });
   }
 
   std::string save() const override {
@@ -180,13 +187,8 @@ class LatticeSolver : public SheetSolver {
       for (int c = 0; c < columns_; ++c, ++i) f(i, state.place(r, c));
   }
 
-  Vector3d exact(int plane, int error, ConstPlace at) const {
-    Vector3d out;
-    for (int axis = 0; axis < 3; ++axis) {
-      out[axis] = at[plane + axis];
-      if (law_.compensated) out[axis] -= double{at[error + axis]};
-    }
-    return out;
+  double exact(int plane, int error, ConstPlace at) const {
+    return law_.compensated ? at[plane] - double{at[error]} : at[plane];
   }
   void set(int plane, int error, Place at, const Vector3d& exact) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -194,8 +196,6 @@ class LatticeSolver : public SheetSolver {
       if (law_.compensated) at[error + axis] = static_cast<T>(double{rounded} - exact[axis]);
     }
   }
-  Vector3d position(ConstPlace at) const { return origin_ + exact(State::kX, State::kXError, at); }
-  Vector3d displacement(ConstPlace at) const { return exact(State::kD, State::kDError, at); }
   void set_position(Place at, const Vector3d& x) {
     set(State::kX, State::kXError, at, x - origin_);
   }

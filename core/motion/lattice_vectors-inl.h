@@ -75,8 +75,8 @@ HWY_INLINE auto each(const F& f, const Each<A, N>& a, const B&... b) {
   return each_of(f, std::make_index_sequence<N>(), a, b...);
 }
 
-// 1 / sqrt(1 - e), to 1.1e-8 in single and 2.9e-10 in double precision where the start leaves it:
-// minimax, highest power first, in c - v s^2 for c in the middle of the start's 3/4 ... 27/32.
+// 1 / sqrt(v s^2) where the start s leaves v s^2 within 3/4 ... 27/32: minimax in kCentre - v s^2,
+// highest power first, right to 1.1e-8 in single and 2.9e-10 in double precision.
 inline constexpr double kCentre = 0.796875;
 template <class T>
 constexpr auto inverse_sqrt_polynomial() {

@@ -124,12 +124,12 @@ class LatticeSolver : public SheetSolver {
     });
   }
   // v = d / dt + a dt / 2: d stands for the velocity half a step ago
-  void closing_velocities(double time, Matrix3Xd& v) override {
+  void closing_velocities(double time, Matrix3Xd& v) const override {
     Matrix3Xd x, a;
     positions(x);
     velocities(v);
     accelerate(dynamics_, time, x, v, a);
-    visit(std::as_const(state_), [&](int i, ConstPlace at) {
+    for_each_particle([&](int i, ConstPlace at) {
       for (int axis = 0; axis < 3; ++axis)
         v(axis, i) =
             exact(State::kD + axis, State::kDError + axis, at) / dt_ + a(axis, i) * (dt_ / 2);

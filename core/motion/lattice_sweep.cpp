@@ -111,7 +111,7 @@ class Sweep {
   // On one vector of each of the rows r, r + 1, r + 2.
   struct Forces {
     Triple<V> own, next, after;
-    Triple<V> beside;  // right of next, until all that goes there is added
+    Triple<V> beside{};  // right of next, until all that goes there is added
   };
 
   // A vector of the halo, that which it continues, and by how many lanes it is shifted against
@@ -208,7 +208,7 @@ class Sweep {
     T *force = forces(r), *force1 = forces(r + 1), *force2 = forces(r + 2), *heard = heard_;
     T* own = state_.own(std::max(r, band_.first));
     const T* columns = law_.columns.data();
-    if constexpr (kStartsRows) std::fill_n(force2, 2 * kForces, T(0));
+    if constexpr (kStartsRows) std::fill_n(force2, 2 * kForces, T(0));  // nothing is left of these
     for (int j = 0; j < vectors_; ++j) {
 #pragma GCC unroll 1
       for (int part = 0; part < kLanes; part += kPart) {
@@ -241,7 +241,7 @@ class Sweep {
                       heard_ + j * kHeard + part,
                       nullptr,
                       law_.columns.data() + j * kColumnPlanes * kLanes + part};
-        Forces f{zero(), zero(), load(force), zero()};
+        Forces f{zero(), zero(), load(force)};
         damp<true>(row, p, f);
         store(f.after, force);
       }
@@ -249,7 +249,7 @@ class Sweep {
 
   template <bool kBorder>
   HWY_INLINE void sweep_vector(const Row& row, const Place& p) {
-    Forces f{load(p.force), load(p.force1), load(p.force2), zero()};
+    Forces f{load(p.force), load(p.force1), load(p.force2)};
     if constexpr (!kStartsRows) store(zero(), p.force);  // for row r + 3
     if (law_.damping > 0 && row.after) damp<kBorder>(row, p, f);
     add_springs<kBorder>(row, p, f, connections());

@@ -172,14 +172,14 @@ class SweepState {
 
   // A particle's values, by plane.
   template <class Value>
-  struct Of {
+  struct PlaceOf {
     Value *seen, *own;
     Value& operator[](int plane) const {
       return (plane < kSeen ? seen : own)[plane * LatticeLayout<T>::kLanes];
     }
   };
-  using Place = Of<T>;
-  using ConstPlace = Of<const T>;
+  using Place = PlaceOf<T>;
+  using ConstPlace = PlaceOf<const T>;
   // Column c of row r; also columns beyond the last, as far as vectors reach.
   Place place(int r, int c) {
     const Column& column = columns_[static_cast<std::size_t>(c)];
@@ -189,7 +189,6 @@ class SweepState {
     const Place place = const_cast<SweepState*>(this)->place(r, c);
     return {place.seen, place.own};
   }
-  T& at(int plane, int r, int c) { return place(r, c)[plane]; }
 
   // Divides the sheet as it is now into so many bands, which may be swept at the same time.
   std::vector<SweepBand<T>>& divide(int bands);

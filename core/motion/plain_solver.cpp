@@ -36,7 +36,7 @@ class PlainSolver : public SheetSolver {
 
   void positions(Matrix3Xd& x) const override { x = motion_.x; }
   void velocities(Matrix3Xd& v) const override { integrator_->velocity(motion_, dt_, v); }
-  void closing_velocities(double time, Matrix3Xd& v) override {
+  void closing_velocities(double time, Matrix3Xd& v) const override {
     integrator_->closing_velocity(dynamics_, time, dt_, motion_, v);
   }
 

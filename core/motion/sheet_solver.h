@@ -35,7 +35,7 @@ class SheetSolver {
   virtual void velocities(Matrix3Xd& v) const = 0;
   // Velocities as the forces at `time` complete them, m/s: what start() needs to go on with other
   // forces or another dt without losing an order.
-  virtual void closing_velocities(double time, Matrix3Xd& v) = 0;
+  virtual void closing_velocities(double time, Matrix3Xd& v) const = 0;
 
   // Everything that later steps depend on, as bytes of this machine, and back: called after
   // start(), with the time and dt that it was saved at. False for bytes that such a solver has not

@@ -52,8 +52,7 @@ struct LogEntry {
 // How far frames may have been published, and which of them subscribers still need.
 struct Reach {
   std::int64_t frame = 0;
-  int holders = 0;             // subscribers that the session waits for
-  std::int64_t held_from = 0;  // first frame that they need, where there are any
+  int holders = 0;  // subscribers that the session waits for
   // First frame that subscribers may want again, where there are any: it is there after a restart.
   std::optional<std::int64_t> history_from = {};
   int readers = 0;  // those who may

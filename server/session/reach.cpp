@@ -37,8 +37,7 @@ void Session::write_reach() {
 }
 
 Reach Session::reach_to(std::int64_t frame) {
-  Reach reach{frame, holders(), first_held_frame()};
-  if (reach.holders == 0) reach.held_from = 0;
+  Reach reach{frame, holders()};
   if (has_readers()) reach.history_from = wanted_from();
   reach.readers = readers();
   return reach;
@@ -53,29 +52,27 @@ std::int64_t Session::wanted_from() {
   std::int64_t next = std::numeric_limits<std::int64_t>::max();
   for (const Subscription* subscription : subscriptions_)
     if (subscription->policy_ != SlowReader::kSkip) next = std::min(next, subscription->next_);
-  if (is_recorded() && (taken_.empty() || now - taken_.back().time >= return_time_ / kNotes))
+  if (recorders() > 0 && (taken_.empty() || now - taken_.back().time >= return_time_ / kNotes))
     taken_.push_back({now, next});
   while (taken_.size() > 1 && now - taken_[1].time >= return_time_) taken_.pop_front();
   for (const Taken& taken : taken_) next = std::min(next, taken.next);
   return std::clamp(next, history_.oldest(), latest());
 }
 
-// Whether there are subscribers that want every frame.
-bool Session::is_recorded() const {
-  return std::any_of(subscriptions_.begin(), subscriptions_.end(),
-                     [](const auto* each) { return each->policy_ != SlowReader::kSkip; });
+// Subscribers that want every frame.
+int Session::recorders() const {
+  return static_cast<int>(
+      std::count_if(subscriptions_.begin(), subscriptions_.end(),
+                    [](const auto* each) { return each->policy_ != SlowReader::kSkip; }));
 }
 
 // Whether there are such, or some that may come back.
 bool Session::has_readers() const {
-  return is_recorded() || past_holders_ || Clock::now() < readers_until_;
+  return recorders() > 0 || past_holders_ || Clock::now() < readers_until_;
 }
 
 int Session::readers() const {
-  const auto here =
-      std::count_if(subscriptions_.begin(), subscriptions_.end(),
-                    [](const auto* each) { return each->policy_ != SlowReader::kSkip; });
-  return static_cast<int>(here) + (Clock::now() < readers_until_ ? past_readers_ : 0);
+  return recorders() + (Clock::now() < readers_until_ ? past_readers_ : 0);
 }
 
 // How far frames may be published once the event is in the log.
@@ -122,14 +119,26 @@ void Session::forget_past_holders() {
 
 // First frame that one of them still needs.
 std::int64_t Session::first_held_frame() {
-  auto first = std::numeric_limits<std::int64_t>::max();
   forget_past_holders();
-  if (past_holders_) first = past_holders_->held_from;
-  for (const Subscription* subscription : subscriptions_) {
-    if (subscription->policy_ == SlowReader::kHoldSession) {
-      first = std::min(first, subscription->next_);
-    }
-  }
+  const auto first = first_wanted_by(SlowReader::kHoldSession);
+  return past_holders_ ? std::min(first, past_holders_->held_from) : first;
+}
+
+// Whether the next frame has to wait for a subscriber. One that is here gets half of the history
+// for frames to come: the other half is what was sent to it and may not have come.
+bool Session::must_hold() {
+  if (!history_.full()) return false;
+  const auto oldest = history_.oldest();
+  forget_past_holders();
+  return (past_holders_ && past_holders_->held_from <= oldest) ||
+         first_wanted_by(SlowReader::kHoldSession) <= (oldest + latest()) / 2;
+}
+
+// Next frame of the slowest with that policy; the largest number where there is none.
+std::int64_t Session::first_wanted_by(SlowReader policy) const {
+  auto first = std::numeric_limits<std::int64_t>::max();
+  for (const Subscription* subscription : subscriptions_)
+    if (subscription->policy_ == policy) first = std::min(first, subscription->next_);
   return first;
 }
 

@@ -90,10 +90,9 @@ bool Session::restore(SessionPast past) {
       readers_until_ = Clock::now() + kHoldAfterRestore;
       taken_.push_back({Clock::now(), *past.reach.history_from});
       past_readers_ = past.reach.readers;
-    }
-    if (past.reach.holders > 0) {
-      past_holders_ =
-          PastHolders{past.reach.holders, past.reach.held_from, Clock::now() + kHoldAfterRestore};
+      if (past.reach.holders > 0) {
+        past_holders_ = PastHolders{past.reach.holders, *past.reach.history_from, readers_until_};
+      }
     }
   }
   if (!repeats) let_go_of_streams();
@@ -679,7 +678,7 @@ std::vector<Repair> Session::take_repairs() {
 std::optional<Clock::time_point> Session::next_due() {
   std::lock_guard lock(mutex_);
   if (closed_ || writing_.then || !active()) return std::nullopt;
-  if (history_.full() && first_held_frame() <= history_.oldest()) {
+  if (must_hold()) {
     held_ = true;
     return past_holders_ ? std::optional(past_holders_->until) : std::nullopt;
   }
@@ -716,7 +715,7 @@ std::shared_ptr<const Frame> Session::make_frame(std::vector<Repair> repairs) co
 
 // Whether the frames to come are all like the last one, without a goal and with nobody to see them.
 bool Session::unattended() const {
-  return simulation_.asleep() && !is_recorded() && !steps_begun() && !run_->until_frame &&
+  return simulation_.asleep() && recorders() == 0 && !steps_begun() && !run_->until_frame &&
          Clock::now() > attended_ + kAttention;
 }
 

@@ -233,10 +233,12 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   bool reach_suffices();
   int holders();
   void forget_past_holders();
-  bool is_recorded() const;
+  int recorders() const;
   bool has_readers() const;
   int readers() const;
   std::int64_t first_held_frame();
+  bool must_hold();
+  std::int64_t first_wanted_by(SlowReader policy) const;
   Progress progress() const;
   Refusal refuse(Refusal::Why why, std::vector<Problem> problems = {}) const {
     return {why, latest(), std::move(problems), {}, {}};

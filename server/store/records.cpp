@@ -128,7 +128,6 @@ std::string encode(const Progress& progress) {
   to.set_entries(progress.entries);
   to.set_frame(progress.reach.frame);
   to.set_holders(progress.reach.holders);
-  to.set_held_from(progress.reach.held_from);
   if (progress.reach.history_from) to.set_history_from(*progress.reach.history_from);
   to.set_readers(progress.reach.readers);
   return to.SerializeAsString();
@@ -151,7 +150,7 @@ KeptSession decode_session(const std::string& bytes) {
 
 Progress decode_progress(const std::string& bytes) {
   const auto from = parse<stored::KeptProgress>(bytes);
-  Progress progress{from.entries(), {from.frame(), from.holders(), from.held_from()}};
+  Progress progress{from.entries(), {from.frame(), from.holders()}};
   if (from.has_history_from()) progress.reach.history_from = from.history_from();
   progress.reach.readers = from.readers();
   return progress;

@@ -122,7 +122,7 @@ struct Rows {
       at(State::kStep2, i) = i % 7 == 0 ? T(0) : T(1e-5);
     }
   }
-  T& at(int plane, int i) { return state.at(plane, i / kColumns, i % kColumns); }
+  T& at(int plane, int i) { return state.place(i / kColumns, i % kColumns)[plane]; }
   Vector3d exact(int plane, int error, int i) {
     Vector3d v;
     for (int axis = 0; axis < 3; ++axis) {

@@ -170,7 +170,7 @@ void fill_with_nan(SweepState<T>& state, const LatticeLayout<T>& layout) {
   for (int r = 0; r < layout.rows; ++r)
     for (int plane = 0; plane < state.planes(); ++plane)
       for (int c = layout.columns; c < layout.vectors() * layout.kLanes; ++c)
-        state.at(plane, r, c) = std::numeric_limits<T>::quiet_NaN();
+        state.place(r, c)[plane] = std::numeric_limits<T>::quiet_NaN();
 }
 
 // Three hands that begin at the end.
@@ -200,10 +200,10 @@ std::vector<T> swept(const SheetDefinition& sheet, bool poisoned, int bands = 1)
     for (int i = 0; i < sheet.particle_count(); ++i) {
       const int r = i / sheet.grid.columns, c = i % sheet.grid.columns;
       for (int axis = 0; axis < 3 && step < 0; ++axis)
-        state.at(State::kX + axis, r, c) = static_cast<T>(x(axis, i));
-      if (step < 0) state.at(State::kStep2, r, c) = T(1e-5);
+        state.place(r, c)[State::kX + axis] = static_cast<T>(x(axis, i));
+      if (step < 0) state.place(r, c)[State::kStep2] = T(1e-5);
       for (int plane = 0; plane < state.planes() && step >= 0; ++plane)
-        out.push_back(state.at(plane, r, c));
+        out.push_back(state.place(r, c)[plane]);
     }
   }
   return out;

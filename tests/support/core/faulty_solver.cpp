@@ -34,7 +34,7 @@ class FaultySolver : public SheetSolver {
   void resolve(const Contacts& contacts, Crew& crew) override { solver_->resolve(contacts, crew); }
   void positions(Matrix3Xd& x) const override { solver_->positions(x); }
   void velocities(Matrix3Xd& v) const override { solver_->velocities(v); }
-  void closing_velocities(double time, Matrix3Xd& v) override {
+  void closing_velocities(double time, Matrix3Xd& v) const override {
     solver_->closing_velocities(time, v);
   }
   std::string save() const override { return solver_->save(); }

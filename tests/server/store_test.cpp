@@ -458,8 +458,8 @@ class RestartWithSnapshots : public Restart {
       const std::int64_t frame = service_->step(session).frame();
       const auto part = snapshots_of(session) / ".part";
       for (int look = 0; last_of(session) == before; ++look) {
-        if (look > 500 && !std::filesystem::exists(part)) break;  // it was left out
-        std::this_thread::yield();
+        if (look > 50 && !std::filesystem::exists(part)) break;  // it was left out
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
       }
       if (last_of(session) == frame) return frame;
     }
@@ -529,6 +529,13 @@ TEST_F(RestartWithSnapshots, NeverMistakesADamagedOneForASound) {
   service_->pause(session);
   EXPECT_EQ(computed(), newest - older);
   EXPECT_EQ(service_->get(session).SerializeAsString(), before);
+}
+
+TEST_F(RestartWithSnapshots, ComputesAllThatTheLogSaysWhereTheyAreDamaged) {
+  const v1::Session session = service_->create();
+  kept(session);
+  const std::int64_t newest = kept(session);
+  const std::string before = service_->get(session).SerializeAsString();
   service_.reset();
   for (const auto& each : files_of(session)) std::ofstream(each, std::ios::binary) << "damaged";
   start();

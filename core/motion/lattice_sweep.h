@@ -222,7 +222,4 @@ class SweepState {
 template <class T>
 T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, Crew& crew);
 
-// Whether this processor has FMA; without it sweeps have other bits.
-bool sweeps_with_fma();
-
 }  // namespace weft

@@ -1,13 +1,20 @@
 #include "server/rpc/server_service.h"
 
-#include "core/motion/lattice_sweep.h"
+#include <sstream>
+
+#include "core/fingerprint.h"
 #include "server/rpc/server_stats.h"
 #include "server/rpc/unary_call.h"
 
 namespace weft {
 
 std::string numerics_id() {
-  return std::string("weft-" WEFT_VERSION) + (sweeps_with_fma() ? "-fma" : "");
+  static const std::string id = [] {
+    std::ostringstream text;
+    text << "weft-" WEFT_VERSION "-" << std::hex << fingerprint();
+    return text.str();
+  }();
+  return id;
 }
 
 grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerContext* context,

@@ -47,6 +47,7 @@ class Sweep {
         state_(state),
         band_(band),
         vectors_(law.layout.vectors()),
+        planes_(law.damping > 0 || law.wind.blows ? State::kSeen : State::kW),
         forces_(work + (kHalo + 1) * kForces),
         heard_(work + forces_size(law.layout)),
         largest_(hn::Zero(D())) {
@@ -148,7 +149,7 @@ class Sweep {
     if (r >= law_.layout.rows) return;
     T* const row = state_.seen(band_, r);
     const auto copy = [&](const T* from, T* to, const T* mask) HWY_ATTR {
-      for (int plane = 0; plane < State::kSeen; ++plane)
+      for (int plane = 0; plane < planes_; ++plane)
         for (int part = 0; part < kLanes; part += kPart) {
           const int at = plane * kLanes + part;
           hn::Store(hn::And(hn::LoadU(d, from + at), hn::Load(d, mask + part)), d, to + at);
@@ -176,9 +177,10 @@ class Sweep {
           hn::Store(hn::Add(hn::Load(d, to), hn::And(hn::LoadU(d, from), mask)), d, to);
         }
       }
-    for (const Halo& halo : halo_)  // for row r + 3
+    // for row r + 3; to the right of it, too, nothing is left of these
+    for (std::size_t k = 0; k < (kStartsRows ? kHalo : halo_.size()); ++k)
       for (int part = 0; part < kLanes; part += kPart)
-        store(zero(), row + halo.at * kForces + part);
+        store(zero(), row + halo_[k].at * kForces + part);
   }
 
   Row describe(int r) const {
@@ -492,7 +494,7 @@ class Sweep {
   const SweepLaw<T>& law_;
   SweepState<T>& state_;
   SweepBand<T>& band_;
-  const int vectors_;
+  const int vectors_, planes_;  // planes: those that neighbours look at
   T *const forces_, *const heard_;
   std::array<Halo, 2 * kHalo> halo_;
   V largest_;  // |d|^2, m^2

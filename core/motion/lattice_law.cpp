@@ -5,16 +5,36 @@
 #include <cstring>
 #include <limits>
 #include <numbers>
+#include <tuple>
+#include <utility>
 
 namespace weft {
 namespace {
+
+// k and k L of a spring (N/m, N), rounded so that their ratio is L to some 1e-9: each to the
+// nearest, they would make all connections longer, or shorter, by the same. k gives way by up to
+// 1e-6.
+template <class T>
+std::pair<T, T> rounded(double stiffness, double length) {
+  constexpr int kTries = 16;
+  auto k = static_cast<T>(stiffness);
+  std::pair<T, T> best{k, static_cast<T>(k * length)};
+  const auto error = [&](const std::pair<T, T>& each) {
+    return std::abs(double{each.second} / each.first - length);
+  };
+  for (int i = 1; stiffness > 0 && i < kTries; ++i) {
+    k = std::nextafter(k, std::numeric_limits<T>::max());
+    const std::pair<T, T> next{k, static_cast<T>(k * length)};
+    if (error(next) < error(best)) best = next;
+  }
+  return best;
+}
 
 template <class T>
 BendLaw<T> bend_law(const BendingForce& force, int terms, double share) {
   BendLaw<T> law;
   const double length = force.rest_length(), scale = share * force.scale();
-  law.clamp = static_cast<T>(share * force.clamp());
-  law.clamp_rest = static_cast<T>(share * force.clamp() * length);
+  std::tie(law.clamp, law.clamp_rest) = rounded<T>(share * force.clamp(), length);
   law.last = static_cast<T>(terms - 1);
   const auto size = static_cast<std::size_t>(std::max(terms, 32));
   law.intercepts = AlignedArray<T>(size);
@@ -137,7 +157,8 @@ SweepLaw<T> make_sweep_law(const SheetDefinition& sheet) {
   const double h = sheet.grid.spacing;
   const T least = resists_compression(sheet.bending) ? std::numeric_limits<T>::lowest() : T(0);
   const auto stretch = [](double stiffness, double length, T lowest) {
-    return StretchLaw<T>{static_cast<T>(stiffness), static_cast<T>(stiffness * length), lowest};
+    const auto [least_off, rest] = rounded<T>(stiffness, length);
+    return StretchLaw<T>{least_off, rest, lowest};
   };
   SweepLaw<T> law;
   law.layout = {sheet.grid.rows, sheet.grid.columns};

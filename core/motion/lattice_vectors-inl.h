@@ -76,17 +76,23 @@ HWY_INLINE auto each(const F& f, const Each<A, N>& a, const B&... b) {
 }
 
 // 1 / sqrt(v s^2) where the start s leaves v s^2 within 3/4 ... 27/32: minimax in kCentre - v s^2,
-// highest power first, right to 1.1e-8 in single and 2.9e-10 in double precision.
-inline constexpr double kCentre = 0.796875;
+// highest power first, right to 1.2e-8 in single and 2.9e-10 in double precision.
 template <class T>
-constexpr auto inverse_sqrt_polynomial() {
-  if constexpr (sizeof(T) == 4)
-    return std::array{0.76284469835884661, 0.69416965332035785, 0.66153688843579361,
-                      0.70288438952739762, 1.1202240675213873};
-  else
-    return std::array{0.86232574451111188, 0.76289427998580939, 0.69180123460826881,
-                      0.66153677950956102, 0.70288569050604333, 1.1202240675512909};
-}
+struct InverseSqrt {
+  static constexpr double kCentre = 0.796875;
+  static constexpr std::array kPolynomial = {0.86232574451111188, 0.76289427998580939,
+                                             0.69180123460826881, 0.66153677950956102,
+                                             0.70288569050604333, 1.1202240675512909};
+};
+// The centre is one where the last coefficient is a float: rounded, it would make every connection
+// longer by the same 5e-8.
+template <>
+struct InverseSqrt<float> {
+  static constexpr double kCentre = 0.79674553871154785;
+  static constexpr std::array kPolynomial = {0.76284469835884662, 0.69456468875051158,
+                                             0.66180656944165694, 0.70305571127320876,
+                                             1.120315074929102};
+};
 
 // 1 / sqrt(v) from an integer start s, unlike the processors' own approximations with equal bits
 // everywhere; then a polynomial, and in double a Newton step. Finite at 0.
@@ -96,7 +102,7 @@ HWY_INLINE Each<V, N> inverse_sqrt(D d, const Each<V, N>& v) {
   const hn::RebindToUnsigned<D> du;
   using U = hn::TFromD<decltype(du)>;
   constexpr bool kSingle = sizeof(T) == 4;
-  constexpr auto kPolynomial = inverse_sqrt_polynomial<T>();
+  constexpr auto kPolynomial = InverseSqrt<T>::kPolynomial;
   const auto set = [&](double value) HWY_ATTR { return hn::Set(d, static_cast<T>(value)); };
   const auto magic = hn::Set(du, static_cast<U>(kSingle ? 0x5f200000u : 0x5fe4000000000000u));
   const auto mul = [](V a, V b) HWY_ATTR { return hn::Mul(a, b); };
@@ -106,7 +112,7 @@ HWY_INLINE Each<V, N> inverse_sqrt(D d, const Each<V, N>& v) {
         return hn::BitCast(d, hn::Sub(magic, hn::ShiftRight<1>(hn::BitCast(du, a))));
       },
       v);
-  const V centre = set(kCentre);
+  const V centre = set(InverseSqrt<T>::kCentre);
   const auto vs = each(mul, v, start);
   const auto e = each([&](V a, V s) HWY_ATTR { return hn::NegMulAdd(a, s, centre); }, vs, start);
   const V first = set(kPolynomial[0]), second = set(kPolynomial[1]);

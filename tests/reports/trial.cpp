@@ -170,7 +170,8 @@ std::string evaluator_name(const ChoiKo& law) {
     case Evaluator::kLinearized:
       break;
   }
-  return fmt::format("{} segments{}", law.segments, law.fold_clamp ? ", folded" : "");
+  return fmt::format("{} segments{}{}", law.segments, law.optimal_breakpoints ? ", optimal" : "",
+                     law.fold_clamp ? ", folded" : "");
 }
 
 std::string integrator_name(IntegratorKind kind) {

@@ -1,11 +1,7 @@
 #include "core/motion/lattice_sweep.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
 
 // compiled again for every target
 #undef HWY_TARGET_INCLUDE
@@ -580,67 +576,6 @@ T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, Crew& crew) {
 
 template float sweep(const SweepLaw<float>&, SweepState<float>&, int, Crew&);
 template double sweep(const SweepLaw<double>&, SweepState<double>&, int, Crew&);
-
-// Large ones on large pages: sheets that fit no cache are stepped some 8 % faster.
-static void* allocate(std::size_t bytes) {
-  constexpr std::size_t kVector = 64, kPage = 2 << 20;
-  const std::size_t unit = bytes < 2 * kPage ? kVector : kPage;
-  const std::size_t size = (bytes + unit - 1) / unit * unit;
-  void* const data = std::aligned_alloc(unit, size);
-  if (data == nullptr) throw std::bad_alloc();
-  if (unit == kPage) madvise(data, size, MADV_HUGEPAGE);  // slower where it is refused
-  return data;
-}
-
-template <class T>
-AlignedArray<T>::AlignedArray(std::size_t size)
-    : data_(static_cast<T*>(allocate(size * sizeof(T)))), size_(size) {
-  std::memset(data_.get(), 0, size * sizeof(T));
-}
-
-template <class T>
-void AlignedArray<T>::Free::operator()(T* data) const {
-  std::free(data);
-}
-
-template <class T>
-SweepState<T>::SweepState(const LatticeLayout<T>& layout, bool compensated)
-    : layout_(layout),
-      planes_(compensated ? kDError + 3 : kXError),
-      seen_(static_cast<std::size_t>(layout.rows * seen_row() + 2 * kMargin)),
-      own_(static_cast<std::size_t>(layout.rows * own_row())) {
-  for (int c = 0; c < layout.vectors() * LatticeLayout<T>::kLanes; ++c) {
-    const std::ptrdiff_t vector = layout.vector(c), lane = layout.lane(c);
-    columns_.push_back({vector * kSeenStride + lane, vector * own_stride() - kSeenStride + lane});
-  }
-}
-
-template <class T>
-std::vector<SweepBand<T>>& SweepState<T>::divide(int bands) {
-  bands_.resize(static_cast<std::size_t>(bands));
-  const int rows = layout_.rows;
-  const auto copy = [&](int row, AlignedArray<T>& to) {
-    if (to.size() == 0) to = AlignedArray<T>(static_cast<std::size_t>(2 * (seen_row() + kMargin)));
-    for (int k = 0; k < 2; ++k) {
-      if (row + k < 0 || row + k >= rows) continue;
-      std::copy_n(seen(row + k), layout_.vectors() * kSeenStride,
-                  to.data() + kMargin + k * seen_row());
-    }
-  };
-  for (int b = 0; b < bands; ++b) {
-    SweepBand<T>& band = bands_[static_cast<std::size_t>(b)];
-    band.first = rows * b / bands;
-    band.last = rows * (b + 1) / bands;
-    if (b > 0) copy(band.first - 2, band.before);
-    if (b + 1 < bands) copy(band.last, band.after);
-  }
-  return bands_;
-}
-
-template class AlignedArray<float>;
-template class AlignedArray<double>;
-template class SweepState<float>;
-template class SweepState<double>;
 
 }  // namespace weft
 #endif

@@ -17,6 +17,8 @@ namespace {
 
 using Sessions = v1::SessionService::Stub;
 
+constexpr int kOwnThreads = 2;  // that gRPC may have started, or ended, meanwhile
+
 // Creates, steps and deletes sessions, several at a time; returns how often that went wrong.
 int come_and_go(client::Connection& connection, int sessions) {
   constexpr int kAtATime = 8;
@@ -46,7 +48,7 @@ int come_and_go(client::Connection& connection, int sessions) {
 Usage settled(const Weftd& weftd, const Usage& wanted) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(5);
   Usage usage = weftd.usage();
-  while ((usage.threads > wanted.threads || usage.files > wanted.files) &&
+  while ((usage.threads > wanted.threads + kOwnThreads || usage.files > wanted.files) &&
          std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
     usage = weftd.usage();
@@ -76,8 +78,9 @@ Outcome churn(Form form) {
                             sessions, sessions / wall.count(), wrong, before.threads, after.threads,
                             before.files, after.files, client::bytes_text(before.memory),
                             client::bytes_text(after.memory), 100 * growth),
-      .hold = "0 wrong; threads and files back, memory within 5 %",
-      .counts = wrong == 0 && after.threads <= before.threads && after.files <= before.files,
+      .hold = fmt::format("0 wrong; files back, threads within {}, memory within 5 %", kOwnThreads),
+      .counts = wrong == 0 && after.threads <= before.threads + kOwnThreads &&
+                after.files <= before.files,
       .bounds = growth <= kMostGrowth};
 }
 

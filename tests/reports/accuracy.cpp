@@ -453,8 +453,7 @@ class AccuracyPage {
     page_.text(over.empty()
                    ? "It is nowhere more."
                    : fmt::format("**It is more in: {}.** In single precision neighbours of a "
-                                 "coordinate of 1 m lie 1.2e-07 m apart; where connections "
-                                 "lie between slack and taut, that does not cancel.",
+                                 "coordinate of 1 m lie 1.2e-07 m apart.",
                                  fmt::join(over, "; ")));
   }
 

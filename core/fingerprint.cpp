@@ -1,6 +1,7 @@
 #include "core/fingerprint.h"
 
 #include <bit>
+#include <random>
 #include <vector>
 
 #include "core/simulation.h"
@@ -13,15 +14,19 @@ SheetDefinition rough_sheet(const BendingLaw& bending) {
   SheetDefinition sheet;
   sheet.name = "sheet";
   sheet.grid = {4, 17, 0.01};
-  sheet.textile.model = MeasuredTextile{0.2, 300, 200, 30, 2e-6, 1e-6, 0.1};
+  sheet.textile.model = MeasuredTextile{.areal_density = 0.2,
+                                        .tensile_warp = 300,
+                                        .tensile_weft = 200,
+                                        .shear = 30,
+                                        .bend_rigidity_warp = 2e-6,
+                                        .bend_rigidity_weft = 1e-6,
+                                        .air_drag = 0.1};
   sheet.bending = bending;
-  std::uint32_t random = 1;
+  std::minstd_rand random;
   for (int r = 0; r < sheet.grid.rows; ++r)
     for (int c = 0; c < sheet.grid.columns; ++c)
-      for (const double at : {c * 0.0098, 0.0, r * 0.0098}) {
-        random = 1664525 * random + 1013904223;  // Knuth's
-        sheet.start_positions.push_back(at + 1e-3 * (random >> 16) / 65536);
-      }
+      for (const double at : {c * 0.0098, 0.0, r * 0.0098})
+        sheet.start_positions.push_back(at + 1e-3 * static_cast<double>(random()) / random.max());
   sheet.pins = {{{0}, {}}};
   return sheet;
 }

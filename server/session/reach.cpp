@@ -49,9 +49,8 @@ Reach Session::reach_to(std::int64_t frame) {
 std::int64_t Session::wanted_from() {
   constexpr int kNotes = 60;
   const auto now = Clock::now();
-  std::int64_t next = std::numeric_limits<std::int64_t>::max();
-  for (const Subscription* subscription : subscriptions_)
-    if (subscription->policy_ != SlowReader::kSkip) next = std::min(next, subscription->next_);
+  std::int64_t next =
+      std::min(first_wanted_by(SlowReader::kDisconnect), first_wanted_by(SlowReader::kHoldSession));
   if (recorders() > 0 && (taken_.empty() || now - taken_.back().time >= return_time_ / kNotes))
     taken_.push_back({now, next});
   while (taken_.size() > 1 && now - taken_[1].time >= return_time_) taken_.pop_front();

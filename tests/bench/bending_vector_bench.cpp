@@ -23,15 +23,18 @@ namespace weft::HWY_NAMESPACE {
 using D = hn::ScalableTag<float>;
 using V = hn::Vec<D>;
 
-// Four vectors at a time, so that a table is loaded once for them; n: a multiple of 64.
+// Four vectors at a time; n: a multiple of 64.
 template <class F>
-void map(const float* r, float* g, std::size_t n, const F& f) {
+HWY_INLINE void map(const float* r, float* HWY_RESTRICT g, std::size_t n, const F& f) {
   const D d;
   const std::size_t step = hn::Lanes(d);
   for (std::size_t i = 0; i < n; i += 4 * step) {
     const auto at = [&](std::size_t k) HWY_ATTR { return hn::Load(d, r + i + k * step); };
     const auto values = each(f, Each<V, 4>{at(0), at(1), at(2), at(3)});
-    for (std::size_t k = 0; k < 4; ++k) hn::Store(values[k], d, g + i + k * step);
+    hn::Store(values[0], d, g + i);
+    hn::Store(values[1], d, g + i + step);
+    hn::Store(values[2], d, g + i + 2 * step);
+    hn::Store(values[3], d, g + i + 3 * step);
   }
 }
 

@@ -78,15 +78,11 @@ double SeriesBending::integral(double r) const {
 
 namespace {
 
-double place(const Breakpoints& b, double r) {
-  return r * (b[0] + r * (b[1] + r * (b[2] + r * b[3])));
-}
-
-// place() solved for r.
+// breakpoint_map() solved for r.
 double breakpoint(const Breakpoints& b, double at) {
   double r = at;
   for (int iteration = 0; iteration < 10; ++iteration)
-    r -= (place(b, r) - at) / (b[0] + r * (2 * b[1] + r * (3 * b[2] + r * 4 * b[3])));
+    r -= (breakpoint_map(b, r) - at) / (b[0] + r * (2 * b[1] + r * (3 * b[2] + r * 4 * b[3])));
   return r;
 }
 
@@ -94,7 +90,7 @@ double breakpoint(const Breakpoints& b, double at) {
 
 LinearizedBending::LinearizedBending(int segments, std::optional<double> clamp,
                                      const Breakpoints& breakpoints)
-    : breakpoints_(breakpoints), segments_(static_cast<std::size_t>(segments)) {
+    : breakpoints_(breakpoints), segments_(static_cast<std::size_t>(segments)), count_(segments) {
   const ExactBending exact;
   const auto node = [&](double r) {
     const double g = exact.value(r);
@@ -113,17 +109,6 @@ LinearizedBending::LinearizedBending(int segments, std::optional<double> clamp,
     end = begin;
     upper = lower;
   }
-}
-
-const LinearizedBending::Segment& LinearizedBending::segment(double r) const {
-  const auto size = static_cast<double>(segments_.size());
-  const auto i = static_cast<std::size_t>(place(breakpoints_, r) * size);
-  return segments_[std::min(i, segments_.size() - 1)];
-}
-
-double LinearizedBending::value(double r) const {
-  const Segment& at = segment(r);
-  return at.intercept + at.slope * r;
 }
 
 double LinearizedBending::integral(double r) const {

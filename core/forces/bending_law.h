@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -45,6 +47,9 @@ class SeriesBending {
 // Where breakpoints lie: w(r) = i / segments, w = r (b0 + r (b1 + r (b2 + r b3))), which rises from
 // 0 to 1. No segment has to be searched for.
 using Breakpoints = std::array<double, 4>;
+inline double breakpoint_map(const Breakpoints& b, double r) {
+  return r * (b[0] + r * (b[1] + r * (b[2] + r * b[3])));
+}
 inline constexpr Breakpoints kEqualBreakpoints = {1};
 // A chord of width h is off by h^2 / 8 g'' / g: of all such w the one whose slope is the least
 // below sqrt(g'' / g), where all segments would be as good as each other. The largest relative
@@ -57,7 +62,10 @@ class LinearizedBending {
   // With a clamp = c_b L^3 / k_b the nodes sample max(g(r), clamp (r - 1)) (fold_clamp, eq. 5).
   explicit LinearizedBending(int segments, std::optional<double> clamp = std::nullopt,
                              const Breakpoints& breakpoints = kEqualBreakpoints);
-  double value(double r) const;
+  double value(double r) const {
+    const Segment& at = segment(r);
+    return at.intercept + at.slope * r;
+  }
   double integral(double r) const;
 
   // g(r) = intercept + slope r, for r up to end.
@@ -68,9 +76,13 @@ class LinearizedBending {
   const Breakpoints& breakpoints() const { return breakpoints_; }
 
  private:
-  const Segment& segment(double r) const;
+  const Segment& segment(double r) const {
+    const auto i = static_cast<std::int64_t>(breakpoint_map(breakpoints_, r) * count_);
+    return segments_[std::min(static_cast<std::size_t>(i), segments_.size() - 1)];
+  }
   Breakpoints breakpoints_;
   std::vector<Segment> segments_;
+  double count_;
 };
 
 // Chebyshev interpolation of g.

@@ -77,6 +77,7 @@ class SweepState {
 
   int planes() const { return planes_; }
   int vectors() const { return layout_.vectors(); }
+  std::size_t bytes() const { return (seen_.size() + own_.size()) * sizeof(T); }
   // Values from one vector of a row to the next.
   static constexpr std::ptrdiff_t kSeenStride = kSeen * LatticeLayout<T>::kLanes;
   std::ptrdiff_t own_stride() const { return (planes_ - kSeen) * LatticeLayout<T>::kLanes; }

@@ -43,6 +43,7 @@ class Sweep {
         state_(state),
         band_(band),
         vectors_(law.layout.vectors()),
+        fetches_(state.bytes() > (std::size_t{8} << 20)),
         planes_(law.damping > 0 || law.wind.blows ? State::kSeen : State::kW),
         forces_(work + (kHalo + 1) * kForces),
         heard_(work + forces_size(law.layout)),
@@ -214,6 +215,7 @@ class Sweep {
       for (int part = 0; part < kLanes; part += kPart) {
         const Place p{seen + part,   seen1 + part, seen2 + part, force + part,  force1 + part,
                       force2 + part, heard + part, own + part,   columns + part};
+        if (fetches_ && part == 0) fetch(seen2, own);
         if (law_.border[static_cast<std::size_t>(j)])
           sweep_vector<true>(row, p);
         else
@@ -223,6 +225,16 @@ class Sweep {
       force += kForces, force1 += kForces, force2 += kForces, heard += kHeard;
       own += state_.own_stride(), columns += kColumnPlanes * kLanes;
     }
+  }
+
+  // Of sheets that fit no cache, what the sweep comes to next.
+  HWY_INLINE void fetch(const T* seen, const T* own) const {
+    constexpr int kAhead = 16;  // vectors
+    const std::ptrdiff_t own_stride = state_.own_stride();
+    for (std::ptrdiff_t at = 0; at < kSeen; at += kLanes)
+      __builtin_prefetch(seen + kAhead * kSeen + at, 1, 2);
+    for (std::ptrdiff_t at = 0; at < own_stride; at += kLanes)
+      __builtin_prefetch(own + kAhead * own_stride + at, 1, 2);
   }
 
   // Lets row r be heard, as row r + 2 is while row r is swept.
@@ -252,7 +264,7 @@ class Sweep {
     Forces f{load(p.force), load(p.force1), load(p.force2)};
     if constexpr (!kStartsRows) store(zero(), p.force);  // for row r + 3
     if (law_.damping > 0 && row.after) damp<kBorder>(row, p, f);
-    add_springs<kBorder>(row, p, f, connections());
+    add_springs<kBorder>(row, p, f, springs(), bends());
     if constexpr (kIsometric) add_isometric<kBorder>(row, p, f);
     if (law_.wind.blows && row.after) add_wind<kBorder>(p, f);
     store(f.next, p.force1);
@@ -267,23 +279,27 @@ class Sweep {
     return minus(from, load((c.to == 1 ? seen1 : seen2) + c.right * kSeen));
   }
 
-  // Force over length, N/m.
+  // A force over its length, N/m, where the connection exists.
   template <bool kBorder, std::size_t k>
-  HWY_INLINE V pull(const Row& row, const Place& p, V l2, V y) const {
-    const D d;
+  HWY_INLINE V existing(const Place& p, V pull) const {
     constexpr Connection c = kConnections[k];
-    V pull = hn::Zero(d);
-    if constexpr (c.bends) {
-      const BendLaw<T>& law = c.from == 1    ? *row.bend_along
-                              : c.right == 0 ? *row.bend_down
-                                             : *row.bend_diagonal;
-      pull = bend<kBend>(d, law, law_.terms, l2, y);
-    } else {
-      pull = stretch(d, c.from == 1 ? row.along : c.right == 0 ? row.down : row.diagonal, y);
-    }
     if constexpr (!kBorder) return pull;
     return c.exists == kShare ? hn::Mul(pull, column(p, kShare))
                               : hn::And(pull, column(p, c.exists));
+  }
+  template <std::size_t k>
+  HWY_INLINE V stretch_pull(const Row& row, V y) const {
+    constexpr Connection c = kConnections[k];
+    return stretch(D(), c.from == 1 ? row.along : c.right == 0 ? row.down : row.diagonal, y);
+  }
+  template <std::size_t k>
+  HWY_INLINE V bend_pull(const Row& row, V l) const {
+    const D d;
+    constexpr Connection c = kConnections[k];
+    const BendLaw<T>& law = c.from == 1    ? *row.bend_along
+                            : c.right == 0 ? *row.bend_down
+                                           : *row.bend_diagonal;
+    return bend<kBend>(d, law, law_.terms, l, hn::Div(hn::Set(d, T(1)), l));
   }
 
   template <std::size_t k>
@@ -307,35 +323,40 @@ class Sweep {
     }
   }
 
-  static constexpr auto connections() {
-    if constexpr (!kInterlaced && kShears) return Connections<0, 1, 2, 3>();
-    if constexpr (!kInterlaced && !kShears) return Connections<0, 1>();
-    if constexpr (kInterlaced && kShears && kBendsDiagonal)
-      return Connections<0, 1, 2, 3, 4, 5, 6, 7>();
-    if constexpr (kInterlaced && kShears && !kBendsDiagonal) return Connections<0, 1, 2, 3, 4, 5>();
-    if constexpr (kInterlaced && !kShears && kBendsDiagonal) return Connections<0, 1, 4, 5, 6, 7>();
-    if constexpr (kInterlaced && !kShears && !kBendsDiagonal) return Connections<0, 1, 4, 5>();
+  static constexpr auto springs() {
+    if constexpr (kShears) return Connections<0, 1, 2, 3>();
+    if constexpr (!kShears) return Connections<0, 1>();
+  }
+  static constexpr auto bends() {
+    if constexpr (!kInterlaced) return Connections<>();
+    if constexpr (kInterlaced && kBendsDiagonal) return Connections<4, 5, 6, 7>();
+    if constexpr (kInterlaced && !kBendsDiagonal) return Connections<4, 5>();
   }
 
   // Keeps the compiler from keeping what it has read through p.
   static HWY_INLINE void forget(const T*& p) { asm("" : "+r"(p)); }
 
-  // Connections that stretch or bend (eq. 2 to 5). Their vectors are formed twice: to keep them
-  // would take more registers than there are.
-  template <bool kBorder, std::size_t... k>
-  HWY_INLINE void add_springs(const Row& row, const Place& p, Forces& f, Connections<k...>) const {
-    using Values = Each<V, sizeof...(k)>;
+  // Connections that stretch or bend (eq. 2 to 5). Those that bend take their roots from the
+  // processor's divider, which works beside its multipliers: faster than either alone. Vectors are
+  // formed twice: to keep them would take more registers than there are.
+  template <bool kBorder, std::size_t... s, std::size_t... b>
+  HWY_INLINE void add_springs(const Row& row, const Place& p, Forces& f, Connections<s...>,
+                              Connections<b...>) const {
     const D d;
-    const Values l2{squared(ends<k>(p.seen, p.seen1, p.seen2))...};
-    const Values y = inverse_sqrt(d, l2);
-    std::size_t i = 0, j = 0;
-    const Values pulls{pull<kBorder, k>(row, p, l2[i++], y[j++])...};
+    const Each<V, sizeof...(s)> l2{squared(ends<s>(p.seen, p.seen1, p.seen2))...};
+    [[maybe_unused]] const Each<V, sizeof...(b)> l{length(ends<b>(p.seen, p.seen1, p.seen2))...};
+    const Each<V, sizeof...(s)> y = inverse_sqrt(d, l2);
+    [[maybe_unused]] std::size_t i = 0, j = 0;
+    const Each<V, sizeof...(s) + sizeof...(b)> pulls{
+        existing<kBorder, s>(p, stretch_pull<s>(row, y[i++]))...,
+        existing<kBorder, b>(p, bend_pull<b>(row, l[j++]))...};
     const T *seen = p.seen, *seen1 = p.seen1, *seen2 = p.seen2;
     forget(seen);
     forget(seen1);
     forget(seen2);
     i = 0;
-    (add<k>(p, ends<k>(seen, seen1, seen2), pulls[i++], f), ...);
+    (add<s>(p, ends<s>(seen, seen1, seen2), pulls[i++], f), ...);
+    (add<b>(p, ends<b>(seen, seen1, seen2), pulls[i++], f), ...);
   }
 
   // Stencils 1, -2, 1 along row r + 1 and down the column, and 1, -1, -1, 1 over the cell between
@@ -490,7 +511,9 @@ class Sweep {
   const SweepLaw<T>& law_;
   SweepState<T>& state_;
   SweepBand<T>& band_;
-  const int vectors_, planes_;  // planes: those that neighbours look at
+  const int vectors_;
+  const bool fetches_;
+  const int planes_;  // those that neighbours look at
   T *const forces_, *const heard_;
   std::array<Halo, 2 * kHalo> halo_;
   V largest_;  // |d|^2, m^2

@@ -49,6 +49,14 @@ HWY_INLINE V squared(const Triple<V>& a) {
   return hn::MulAdd(a.z, a.z, hn::MulAdd(a.y, a.y, hn::Mul(a.x, a.x)));
 }
 
+// |a|, not below 1e-15 m: 1 / |a| is finite.
+template <class V>
+HWY_INLINE V length(const Triple<V>& a) {
+  const hn::DFromV<V> d;
+  const V least = hn::Set(d, static_cast<hn::TFromD<decltype(d)>>(1e-30));
+  return hn::Sqrt(hn::MulAdd(a.z, a.z, hn::MulAdd(a.y, a.y, hn::MulAdd(a.x, a.x, least))));
+}
+
 template <class V>
 HWY_INLINE V dot(const Triple<V>& a, const Triple<V>& b) {
   return hn::MulAdd(a.z, b.z, hn::MulAdd(a.y, b.y, hn::Mul(a.x, b.x)));
@@ -152,34 +160,21 @@ HWY_INLINE V look_up(D d, const hn::TFromD<D>* table, I i) {
   return hn::Load(d, values);
 }
 
-// Of 32 equal segments, the number of that whose middle lies this far beyond the first one's: in
-// the lowest bits of a value so large that it holds no fraction.
-template <class D, class V = hn::Vec<D>>
-HWY_INLINE V nearest_middle(D d, const BendLaw<hn::TFromD<D>>& law, V beyond) {
-  using T = hn::TFromD<D>;
-  constexpr T kWhole = sizeof(T) == 4 ? T(0x1.8p23) : T(0x1.8p52);
-  return hn::MulAdd(beyond, hn::Set(d, law.to_index[0]), hn::Set(d, kWhole));
-}
-
-// Where in its table or polynomial a length lies.
+// Where in its table or polynomial a length lies. Of 32 equal segments, the number of that whose
+// middle is nearest: in the lowest bits of a value so large that it holds no fraction.
 template <BendKind kKind, class D, class V = hn::Vec<D>>
 HWY_INLINE V place(D d, const BendLaw<hn::TFromD<D>>& law, V l) {
+  using T = hn::TFromD<D>;
+  constexpr T kWhole = sizeof(T) == 4 ? T(0x1.8p23) : T(0x1.8p52);
   const auto& t = law.to_index;
   if constexpr (kKind == BendKind::kTable32)
-    return nearest_middle(d, law, hn::Sub(l, hn::Set(d, law.half_segment)));
+    return hn::MulAdd(hn::Sub(l, hn::Set(d, law.half_segment)), hn::Set(d, t[0]),
+                      hn::Set(d, kWhole));
   if constexpr (kKind == BendKind::kPolynomial) return hn::Mul(l, hn::Set(d, t[0]));
   V sum = hn::MulAdd(l, hn::Set(d, t[3]), hn::Set(d, t[2]));
   sum = hn::MulAdd(l, sum, hn::Set(d, t[1]));
   return hn::Mul(l, hn::MulAdd(l, sum, hn::Set(d, t[0])));
 }
-// The same of a length a b.
-template <BendKind kKind, class D, class V = hn::Vec<D>>
-HWY_INLINE V place(D d, const BendLaw<hn::TFromD<D>>& law, V a, V b) {
-  if constexpr (kKind == BendKind::kTable32)
-    return nearest_middle(d, law, hn::MulSub(a, b, hn::Set(d, law.half_segment)));
-  return place<kKind>(d, law, hn::Mul(a, b));
-}
-
 // intercept / l + slope of the segment that `at` lies in. A table of 32 repeats itself: a length
 // beyond it pulls at nothing. Where registers hold it, it is looked up there.
 template <BendKind kKind, class D, class V = hn::Vec<D>>
@@ -249,8 +244,8 @@ HWY_INLINE V polynomial(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V at)
 
 // max(f_b, c_b (l - L)) / l where negative, N/m (eq. 3 to 5); y = 1 / l.
 template <BendKind kKind, class D, class V = hn::Vec<D>>
-HWY_INLINE V bend(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V l2, V y) {
-  const V at = place<kKind>(d, law, l2, y);
+HWY_INLINE V bend(D d, const BendLaw<hn::TFromD<D>>& law, int terms, V l, V y) {
+  const V at = place<kKind>(d, law, l);
   V f = hn::Zero(d);
   if constexpr (kKind == BendKind::kPolynomial)
     f = hn::Mul(polynomial(d, law, terms, at), y);

@@ -182,7 +182,8 @@ TEST(Conservation, EnergyOfAPreStretchedSheetStaysWithinTwoPercentOver100000Unda
   RecordProperty("largest_change", std::to_string(largest));
 }
 
-// Largest growth of the energy of a free sheet, k_d = 0, that buckles for 1 s, as a share.
+// Largest growth of the energy of a free sheet, k_d = 0, that buckles for 0.05 s, as a share: later,
+// what rounding has done to the motion shows in it.
 double buckling_growth(double share_of_bound) {
   SheetDefinition sheet = flat_sheet(8, 8, 0.05);
   sheet.textile.damping = 0;
@@ -193,7 +194,7 @@ double buckling_growth(double share_of_bound) {
   const FrameStats start = simulation.stats();
   const double energy = start.kinetic_energy + start.potential_energy;
   double growth = 0;
-  for (int frame = 0; frame < 100; ++frame) {
+  for (int frame = 0; frame < 5; ++frame) {
     EXPECT_TRUE(simulation.advance_frame());
     const FrameStats now = simulation.stats();
     growth = std::max(growth, (now.kinetic_energy + now.potential_energy) / energy - 1);
@@ -201,14 +202,13 @@ double buckling_growth(double share_of_bound) {
   return growth;
 }
 
-TEST(Conservation, EnergyGrowthOfAFreeBucklingSheetFallsAtLeastWithTheSquareOfTheStep) {
-  const double half = buckling_growth(0.5), quarter = buckling_growth(0.25),
-               tenth = buckling_growth(0.1);
-  RecordProperty("growth_at_half", std::to_string(half));
-  RecordProperty("growth_at_quarter", std::to_string(quarter));
-  RecordProperty("growth_at_tenth", std::to_string(tenth));
-  EXPECT_LT(quarter, half / 4);
-  EXPECT_LT(tenth, half / 25);
+TEST(Conservation, EnergyGrowthOfAFreeBucklingSheetFallsWithTheSquareOfTheStep) {
+  const auto order = [](double share_of_bound) {
+    return std::log(buckling_growth(share_of_bound) / buckling_growth(share_of_bound / 4)) /
+           std::log(4);
+  };
+  EXPECT_NEAR(order(0.4), 2, 0.15);
+  EXPECT_NEAR(order(0.2), 2, 0.15);
 }
 
 }  // namespace

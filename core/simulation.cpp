@@ -24,16 +24,27 @@ struct Sheet {
   Mesh mesh;
   Dynamics dynamics;  // the forces in double
   std::unique_ptr<SheetSolver> solver;
-  SheetState good;  // at the end of the last frame
   double skin = 0;  // m
   double most_strain = kMostStrain;
   std::optional<TextileRamp> ramp;
+
+  // At the end of the last frame. Between frames it is what the solver holds.
+  const SheetState& good() const {
+    if (good_.x.size() == 0) read(good_);
+    return good_;
+  }
+  void read_good() { read(good_); }
+  void set_good(SheetState& state) { std::swap(good_, state); }
+  void forget_good() { good_ = {}; }
 
   void read(SheetState& state) const {
     solver->positions(state.x);
     solver->velocities(state.v);
     state.kinetic_energy = kinetic_energy(mesh, state.v);
   }
+
+ private:
+  mutable SheetState good_;  // empty: not looked at since
 };
 
 // Sheets at the end of the frame that is being computed.
@@ -225,7 +236,6 @@ Simulation::State::State(Scene given, SolverFactory factory)
     set_led_velocities(definition.pins, 0, dt, v);
     sheets[s].solver = make_solver(scene, definition, sheets[s].dynamics);
     sheets[s].solver->start(x[s], v, 0, dt);
-    sheets[s].read(sheets[s].good);
     sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
   }
 }
@@ -275,13 +285,13 @@ void Simulation::State::adopt(Handling handling) {
 
 Moment Simulation::State::moment() const {
   return {scene, time(), [this](std::size_t s, int i) { return sheets[s].start(i); },
-          [this](std::size_t s, int i) { return sheets[s].good.x.col(i); }};
+          [this](std::size_t s, int i) { return sheets[s].good().x.col(i); }};
 }
 
 Course Simulation::State::course() const {
   Course course;
   for (const Sheet& sheet : sheets) {
-    course.x.push_back(sheet.good.x);
+    course.x.push_back(sheet.good().x);
     sheet.solver->closing_velocities(time(), course.v.emplace_back());
   }
   return course;
@@ -294,7 +304,7 @@ void Simulation::State::go_on(const Course& course, double old_dt,
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     if (!changed[s] && dt == old_dt) continue;
     sheets[s].solver->start(course.x[s], course.v[s], time(), dt);
-    sheets[s].read(sheets[s].good);
+    sheets[s].read_good();
   }
 }
 
@@ -305,7 +315,7 @@ void Simulation::State::put_textile(std::size_t sheet, const Textile& textile) {
 
 Plan Simulation::State::plan_now() const {
   std::vector<Matrix3Xd> x;
-  for (const Sheet& sheet : sheets) x.push_back(sheet.good.x);
+  for (const Sheet& sheet : sheets) x.push_back(sheet.good().x);
   return plan_for(x);
 }
 
@@ -361,7 +371,7 @@ bool Simulation::State::quiet(const NextStates& next) const {
     const Sheet& sheet = sheets[s];
     const Grid& grid = scene.sheets[s].grid;
     const double height = (std::max(grid.rows, grid.columns) - 1) * grid.spacing;
-    const Matrix3Xd &v = next[s].v, &before = sheet.good.v;
+    const Matrix3Xd &v = next[s].v, &before = sheet.good().v;
     double energy = 0;
     for (Eigen::Index i = 0; i < v.cols(); ++i) {
       if (sheet.dynamics.inverse_mass[i] == 0) continue;
@@ -386,9 +396,10 @@ Attempt Simulation::State::attempt(Crew& crew, NextStates& next) {
     const Drive drive{scene.environment.gravity,
                       drive_speed(scene, scene.sheets[s], begin, begin + scene.solver.frame_step),
                       scene.solver.frame_step};
-    made.sheets.push_back(scene.solver.max_repairs == 0
-                              ? inspect_finite(next[s])
-                              : inspect(sheet.mesh, drive, sheet.most_strain, sheet.good, next[s]));
+    made.sheets.push_back(
+        scene.solver.max_repairs == 0
+            ? inspect_finite(next[s])
+            : inspect(sheet.mesh, drive, sheet.most_strain, sheet.good(), next[s]));
     if (made.reason.empty() && !made.sheets.back().reason.empty())
       made.reason = scene.sheets[s].name + ": " + made.sheets.back().reason;
   }
@@ -399,6 +410,7 @@ Attempt Simulation::State::attempt(Crew& crew, NextStates& next) {
 bool Simulation::State::compute_frame(Crew& crew, NextStates& next) {
   const std::size_t repairs_before = repairs.size();
   const int halvings_before = halvings;
+  for (const Sheet& sheet : sheets) sheet.good();  // to go back to
   for (std::optional<Attempt> doubtful;;) {
     Attempt made = attempt(crew, next);
     if (made.reason.empty()) return true;
@@ -413,6 +425,7 @@ bool Simulation::State::compute_frame(Crew& crew, NextStates& next) {
         const double end = time() + scene.solver.frame_step;
         sheets[s].solver->closing_velocities(end, v);
         sheets[s].solver->start(next[s].x, v, end, plan.step.substep);
+        sheets[s].read(next[s]);
       }
       return true;
     }
@@ -426,7 +439,7 @@ bool Simulation::State::compute_frame(Crew& crew, NextStates& next) {
     set_halvings(halvings + 1);
     repairs.push_back({frame + 1, plan.step.substep, made.reason});
     for (Sheet& sheet : sheets)
-      sheet.solver->start(sheet.good.x, sheet.good.v, time(), plan.step.substep);
+      sheet.solver->start(sheet.good().x, sheet.good().v, time(), plan.step.substep);
     doubtful = std::move(made);
   }
 }
@@ -469,9 +482,17 @@ bool Simulation::advance_frame(Crew& crew) {
     return false;
   state.substeps = state.plan.step.substeps;
   state.frames_at_rest = state.quiet(next) ? state.frames_at_rest + 1 : 0;
-  for (std::size_t s = 0; s < next.size(); ++s) std::swap(state.sheets[s].good, next[s]);
+  for (std::size_t s = 0; s < next.size(); ++s) state.sheets[s].set_good(next[s]);
   ++state.frame;
   return true;
+}
+
+void Simulation::pack() {
+  if (!state_->failure.empty()) return;  // solvers are beyond the last good frame
+  for (Sheet& sheet : state_->sheets) {
+    sheet.forget_good();
+    sheet.solver->pack();
+  }
 }
 
 int Simulation::most_hands() const {
@@ -512,24 +533,24 @@ void copy_planes(const Matrix3Xd& from, Eigen::Index first, std::span<double> ou
 void Simulation::copy_positions(std::span<double> out) const {
   Eigen::Index first = 0;
   for (const Sheet& sheet : state_->sheets) {
-    copy_planes(sheet.good.x, first, out);
-    first += sheet.good.x.cols();
+    copy_planes(sheet.good().x, first, out);
+    first += sheet.good().x.cols();
   }
 }
 
 void Simulation::copy_velocities(std::span<double> out) const {
   Eigen::Index first = 0;
   for (const Sheet& sheet : state_->sheets) {
-    copy_planes(sheet.good.v, first, out);
-    first += sheet.good.v.cols();
+    copy_planes(sheet.good().v, first, out);
+    first += sheet.good().v.cols();
   }
 }
 
 FrameStats Simulation::stats() const {
   FrameStats stats;
   for (const Sheet& sheet : state_->sheets) {
-    const Matrix3Xd& x = sheet.good.x;
-    stats.kinetic_energy += sheet.good.kinetic_energy;
+    const Matrix3Xd& x = sheet.good().x;
+    stats.kinetic_energy += sheet.good().kinetic_energy;
     stats.potential_energy += spring_energy(sheet.mesh, x) + isometric_energy(sheet.mesh, x) -
                               sheet.mesh.mass.dot(x.transpose() * sheet.dynamics.gravity);
     stats.largest_strain = std::max(stats.largest_strain, largest_strain(sheet.mesh, x));
@@ -638,8 +659,8 @@ Snapshot Simulation::snapshot() const {
       {},          handling()};
   for (std::size_t s = 0; s < state.sheets.size(); ++s) {
     const Sheet& sheet = state.sheets[s];
-    snapshot.sheets.push_back({state.scene.sheets[s].textile, sheet.most_strain, sheet.good.x,
-                               sheet.good.v, sheet.solver->save(), sheet.ramp});
+    snapshot.sheets.push_back({state.scene.sheets[s].textile, sheet.most_strain, sheet.good().x,
+                               sheet.good().v, sheet.solver->save(), sheet.ramp});
   }
   return snapshot;
 }
@@ -674,7 +695,6 @@ bool Simulation::State::take_over(const Snapshot& snapshot) {
     const Snapshot::Sheet& saved = snapshot.sheets[s];
     sheet.most_strain = saved.most_strain;
     sheet.ramp = saved.ramp;
-    sheet.good = {saved.x, saved.v, kinetic_energy(sheet.mesh, saved.v)};
     sheet.solver->start(saved.x, saved.v, time(), plan.step.substep);
     if (!sheet.solver->load(saved.solver)) return false;
   }

@@ -55,6 +55,9 @@ class Simulation {
   [[nodiscard]] bool advance_frame(Crew& crew = no_crew());
   // More than these have nothing to do in a crew.
   int most_hands() const;
+  // Lets go of half of its memory, until the next call that needs it: for a while without frames.
+  // Changes nothing else.
+  void pack();
   // All so far.
   const std::vector<Repair>& repairs() const;
   // Why advance_frame() returned false.

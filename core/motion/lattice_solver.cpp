@@ -109,6 +109,8 @@ class LatticeSolver : public SheetSolver {
     return std::max(1, std::min(particles_ / kParticles, law_.layout.rows / kRows));
   }
 
+  void pack() override { state_.pack(); }
+
   void positions(Matrix3Xd& x) const override {
     x.resize(3, particles_);
     for_each_particle([&](int i, ConstPlace at) {

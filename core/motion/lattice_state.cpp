@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <new>
+#include <utility>
 
 namespace weft {
 namespace {
@@ -38,7 +39,7 @@ template <class T>
 SweepState<T>::SweepState(const LatticeLayout<T>& layout, bool compensated)
     : layout_(layout),
       planes_(compensated ? kDError + 3 : kXError),
-      seen_(static_cast<std::size_t>(layout.rows * seen_row() + 2 * kMargin)),
+      seen_(seen_size(halo_)),
       own_(static_cast<std::size_t>(layout.rows * own_row())) {
   for (int c = 0; c < layout.vectors() * LatticeLayout<T>::kLanes; ++c) {
     const std::ptrdiff_t vector = layout.vector(c), lane = layout.lane(c);
@@ -47,15 +48,36 @@ SweepState<T>::SweepState(const LatticeLayout<T>& layout, bool compensated)
 }
 
 template <class T>
+void SweepState<T>::set_halo(int halo) {
+  if (halo == halo_) return;
+  AlignedArray<T> old(seen_size(halo));
+  std::swap(old, seen_);
+  const int old_halo = std::exchange(halo_, halo);
+  for (int r = 0; r < layout_.rows; ++r)
+    std::copy_n(old.data() + seen_at(r, old_halo), layout_.vectors() * kSeenStride, seen(r));
+}
+
+template <class T>
+void SweepState<T>::pack() {
+  bands_.clear();
+  try {
+    set_halo(0);
+  } catch (const std::bad_alloc&) {  // it stays as it is
+  }
+}
+
+template <class T>
 std::vector<SweepBand<T>>& SweepState<T>::divide(int bands) {
+  set_halo(LatticeLayout<T>::kHalo);
   bands_.resize(static_cast<std::size_t>(bands));
   const int rows = layout_.rows;
   const auto copy = [&](int row, AlignedArray<T>& to) {
-    if (to.size() == 0) to = AlignedArray<T>(static_cast<std::size_t>(2 * (seen_row() + kMargin)));
+    if (to.size() == 0)
+      to = AlignedArray<T>(static_cast<std::size_t>(2 * (row_size(halo_) + margin(halo_))));
     for (int k = 0; k < 2; ++k) {
       if (row + k < 0 || row + k >= rows) continue;
       std::copy_n(seen(row + k), layout_.vectors() * kSeenStride,
-                  to.data() + kMargin + k * seen_row());
+                  to.data() + margin(halo_) + k * row_size(halo_));
     }
   };
   for (int b = 0; b < bands; ++b) {

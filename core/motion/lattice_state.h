@@ -82,7 +82,7 @@ class SweepState {
   static constexpr std::ptrdiff_t kSeenStride = kSeen * LatticeLayout<T>::kLanes;
   std::ptrdiff_t own_stride() const { return (planes_ - kSeen) * LatticeLayout<T>::kLanes; }
   // Vector 0 of a row.
-  T* seen(int r) { return seen_.data() + kMargin + r * seen_row(); }
+  T* seen(int r) { return seen_.data() + seen_at(r, halo_); }
   T* own(int r) { return own_.data() + r * own_row(); }
 
   // A particle's values, by plane.
@@ -105,20 +105,25 @@ class SweepState {
     return {place.seen, place.own};
   }
 
+  // Lets go of what only sweeps need, until the next is prepared.
+  void pack();
   // Divides the sheet as it is now into so many bands, which may be swept at the same time.
   std::vector<SweepBand<T>>& divide(int bands);
   // What a band sees of row r, first - 2 <= r < last + 2.
   T* seen(SweepBand<T>& band, int r) {
-    if (r < band.first) return band.before.data() + kMargin + (r - band.first + 2) * seen_row();
-    if (r >= band.last) return band.after.data() + kMargin + (r - band.last) * seen_row();
+    if (r < band.first) return band.before.data() + seen_at(r - band.first + 2, halo_);
+    if (r >= band.last) return band.after.data() + seen_at(r - band.last, halo_);
     return seen(r);
   }
 
  private:
-  static constexpr std::ptrdiff_t kMargin = (LatticeLayout<T>::kHalo + 1) * kSeenStride;
-  std::ptrdiff_t seen_row() const {
-    return (layout_.vectors() + 2 * LatticeLayout<T>::kHalo) * kSeenStride;
+  static std::ptrdiff_t margin(int halo) { return (halo + 1) * kSeenStride; }
+  std::ptrdiff_t row_size(int halo) const { return (vectors() + 2 * halo) * kSeenStride; }
+  std::ptrdiff_t seen_at(int r, int halo) const { return margin(halo) + r * row_size(halo); }
+  std::size_t seen_size(int halo) const {
+    return static_cast<std::size_t>(seen_at(layout_.rows, halo) + margin(halo));
   }
+  void set_halo(int halo);
   std::ptrdiff_t own_row() const { return layout_.vectors() * own_stride(); }
 
   struct Column {
@@ -126,6 +131,7 @@ class SweepState {
   };
   LatticeLayout<T> layout_;
   int planes_;
+  int halo_ = LatticeLayout<T>::kHalo;  // 0: packed
   std::vector<Column> columns_;
   AlignedArray<T> seen_, own_;
   std::vector<SweepBand<T>> bands_;

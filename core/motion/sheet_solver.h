@@ -29,6 +29,8 @@ class SheetSolver {
 
   // More than these have nothing to do in a crew.
   virtual int most_hands() const { return 1; }
+  // Lets go of memory that only steps need, until the next one.
+  virtual void pack() {}
 
   // Present state: m, m/s.
   virtual void positions(Matrix3Xd& x) const = 0;

@@ -676,6 +676,18 @@ std::vector<Repair> Session::take_repairs() {
 
 // When the next frame is to be computed; nullopt: not before something happens.
 std::optional<Clock::time_point> Session::next_due() {
+  const auto due = due_time();
+  if (!due && idle()) simulation_.pack();
+  return due;
+}
+
+// Whether there is nothing to compute: nothing was asked for, or there is nobody to see it.
+bool Session::idle() {
+  std::lock_guard lock(mutex_);
+  return !active() || (!restoring_ && unattended());
+}
+
+std::optional<Clock::time_point> Session::due_time() {
   std::lock_guard lock(mutex_);
   if (closed_ || writing_.then || !active()) return std::nullopt;
   if (must_hold()) {

@@ -217,6 +217,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::vector<Repair> take_repairs();
   void fail(const std::string& why);
   std::optional<Clock::time_point> next_due();
+  std::optional<Clock::time_point> due_time();
+  bool idle();
   bool unattended() const;
   std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs) const;
 

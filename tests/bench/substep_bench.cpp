@@ -70,7 +70,7 @@ void advance(benchmark::State& state, const Case& given, std::optional<Simulatio
   hwy::SetSupportedTargetsForTest(0);
 }
 
-// Bytes that a simulation holds when it has made its first frame.
+// Bytes that a simulation holds when it has made its first frame, and packed.
 void hold(benchmark::State& state, int rows) {
   SheetDefinition sheet = testing::flat_sheet(rows, rows);
   sheet.pins = {{{0, rows - 1}, {}}};
@@ -81,13 +81,16 @@ void hold(benchmark::State& state, int rows) {
   for (auto _ : state) {
     std::vector<Simulation> simulations;
     simulations.reserve(kCount);
-    const struct mallinfo2 before = mallinfo2();
+    const auto used = [] {
+      const struct mallinfo2 now = mallinfo2();
+      return static_cast<double>(now.uordblks + now.hblkhd);
+    };
+    const double before = used();
     for (int i = 0; i < kCount; ++i)
       if (!simulations.emplace_back(scene).advance_frame()) std::abort();
-    const struct mallinfo2 after = mallinfo2();
-    state.counters["bytes"] =
-        static_cast<double>(after.uordblks + after.hblkhd - before.uordblks - before.hblkhd) /
-        kCount;
+    state.counters["bytes"] = (used() - before) / kCount;
+    for (Simulation& simulation : simulations) simulation.pack();
+    state.counters["bytes_packed"] = (used() - before) / kCount;
   }
 }
 

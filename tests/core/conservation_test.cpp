@@ -182,8 +182,8 @@ TEST(Conservation, EnergyOfAPreStretchedSheetStaysWithinTwoPercentOver100000Unda
   RecordProperty("largest_change", std::to_string(largest));
 }
 
-// Largest growth of the energy of a free sheet, k_d = 0, that buckles for 0.05 s, as a share: later,
-// what rounding has done to the motion shows in it.
+// Largest growth of the energy of a free sheet, k_d = 0, that buckles for 0.05 s, as a share: later
+// than that, what rounding has done to the motion shows.
 double buckling_growth(double share_of_bound) {
   SheetDefinition sheet = flat_sheet(8, 8, 0.05);
   sheet.textile.damping = 0;

@@ -1,9 +1,11 @@
 #include "core/simulation.h"
 
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <numbers>
 
 #include "tests/support/core/scenes.h"
@@ -249,6 +251,22 @@ TEST(Simulation, ASheetComesToRestAndIsToldSo) {
   while (!simulation.at_rest() && simulation.time() < 100) run(simulation, 1);
   EXPECT_TRUE(simulation.at_rest());
   EXPECT_LT(simulation.stats().kinetic_energy, 1e-6 * 49e-3 * 9.8 * 0.3);
+}
+
+TEST(Simulation, Of961ParticlesTakesAtMost128KiBWhilePacked) {
+  const auto used = [] {
+    const struct mallinfo2 now = mallinfo2();
+    return now.uordblks + now.hblkhd;
+  };
+  if (used() == 0) GTEST_SKIP() << "this allocator does not count";
+  Scene scene = floating(flat_sheet(31, 31));
+  scene.solver.precision = Precision::kSingle;
+  run(*std::make_unique<Simulation>(scene), 1);  // what a thread keeps
+  const std::size_t before = used();
+  Simulation simulation(scene);
+  run(simulation, 1);
+  simulation.pack();
+  EXPECT_LE(used() - before, 128u << 10);
 }
 
 TEST(Simulation, ASceneAtRestSleepsUntilItsTextileChanges) {

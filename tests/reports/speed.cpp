@@ -19,7 +19,7 @@ struct Run {
   double time = 0;   // of an iteration, ns, as the median of the repetitions
   double items = 0;  // per second: evaluations or particle-substeps
   double error = 0;
-  double bytes = 0;
+  double bytes = 0, bytes_packed = 0;
 
   double item_time() const { return 1e9 / items; }  // ns
 };
@@ -36,8 +36,8 @@ class SpeedPage {
       if (run.value("aggregate_name", "") != "median" || run.value("error_occurred", false))
         continue;
       const auto value = [&](const char* name) { return run.value(name, 0.0); };
-      const Run median{value("cpu_time"), value("items_per_second"), value("error"),
-                       value("bytes")};
+      const Run median{value("cpu_time"), value("items_per_second"), value("error"), value("bytes"),
+                       value("bytes_packed")};
       const std::string name = run.at("run_name");
       runs_[name] = median;
       page_.row({name, number(median.time), number(median.items), number(median.error),
@@ -246,7 +246,8 @@ class SpeedPage {
     for (const char* size : {"31x31", "101x101"})
       if (const Run* run = find(fmt::format("memory/{}/iterations:1", size)))
         page_.text(
-            fmt::format("A simulation of {} particles holds {:.0f} KiB.", size, run->bytes / 1024));
+            fmt::format("A simulation of {} particles holds {:.0f} KiB, packed for a pause {:.0f}.",
+                        size, run->bytes / 1024, run->bytes_packed / 1024));
   }
 
   Page page_;

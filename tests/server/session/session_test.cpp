@@ -1,9 +1,11 @@
 #include "server/session/session.h"
 
 #include <gmock/gmock.h>
+#include <malloc.h>
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <mutex>
 #include <thread>
 
@@ -80,6 +82,35 @@ TEST(Session, AsleepWithoutGoalAndUnattendedTakesNoTurn) {
   const auto viewer = Watcher::of(*session, {}, SlowReader::kSkip);
   EXPECT_TRUE(is_idle(scheduler, *session)) << "it goes on for one who looks and records nothing";
   EXPECT_EQ(session->status().state, SessionState::kRunning);
+}
+
+TEST(Session, WithNothingToDoHoldsAThirdLessThanWhatItsSimulationMovesIn) {
+  const auto used = [] {
+    const struct mallinfo2 now = mallinfo2();
+    return static_cast<double>(now.uordblks + now.hblkhd);
+  };
+  Scene scene = hung_scene();
+  scene.sheets[0].grid = {101, 101, 0.01};
+  scene.solver.precision = Precision::kSingle;
+  ASSERT_TRUE(Simulation(scene).advance_frame());  // leaves to this thread what threads keep
+  const double before_moving = used();
+  auto moving = std::make_unique<Simulation>(scene);
+  ASSERT_TRUE(moving->advance_frame());
+  const double moves_in = used() - before_moving;
+  if (moves_in == 0) GTEST_SKIP() << "this allocator does not count";
+  moving.reset();
+
+  Scheduler scheduler(1);
+  step(*make_session(scheduler, scene), 1).applied();  // the same for that of the scheduler
+  const double before = used();
+  const auto session = make_session(scheduler, scene);
+  step(*session, 1).applied();
+  const auto holds = [&] {
+    return used() - before - 2 * static_cast<double>(session->status().newest->bytes());
+  };
+  for (int i = 0; i < 1000 && holds() > 0.67 * moves_in; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_LT(holds(), 0.67 * moves_in);
+  EXPECT_GT(holds(), 0.3 * moves_in);
 }
 
 TEST(Session, AsleepGoesOnWithItsFirstStream) {

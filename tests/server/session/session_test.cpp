@@ -4,6 +4,7 @@
 #include <malloc.h>
 
 #include <cmath>
+#include <future>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -101,7 +102,16 @@ TEST(Session, WithNothingToDoHoldsAThirdLessThanWhatItsSimulationMovesIn) {
   moving.reset();
 
   Scheduler scheduler(1);
-  step(*make_session(scheduler, scene), 1).applied();  // the same for that of the scheduler
+  std::weak_ptr<Session> first;
+  {
+    const auto session = make_session(scheduler, scene);
+    step(*session, 1).applied();  // the same for the thread of the scheduler
+    first = session;
+  }
+  while (!first.expired()) std::this_thread::yield();
+  std::promise<void> destroyed;  // on that thread, if not on this one
+  ASSERT_TRUE(scheduler.post([&] { destroyed.set_value(); }));
+  destroyed.get_future().wait();
   const double before = used();
   const auto session = make_session(scheduler, scene);
   step(*session, 1).applied();

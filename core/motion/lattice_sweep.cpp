@@ -261,10 +261,11 @@ class Sweep {
 
   template <bool kBorder>
   HWY_INLINE void sweep_vector(const Row& row, const Place& p) {
+    const auto pulls = pull<kBorder>(row, p, springs(), bends());
     Forces f{load(p.force), load(p.force1), load(p.force2)};
     if constexpr (!kStartsRows) store(zero(), p.force);  // for row r + 3
     if (law_.damping > 0 && row.after) damp<kBorder>(row, p, f);
-    add_springs<kBorder>(row, p, f, springs(), bends());
+    add(p, pulls, f, springs(), bends());
     if constexpr (kIsometric) add_isometric<kBorder>(row, p, f);
     if (law_.wind.blows && row.after) add_wind<kBorder>(p, f);
     store(f.next, p.force1);
@@ -336,27 +337,33 @@ class Sweep {
   // Keeps the compiler from keeping what it has read through p.
   static HWY_INLINE void forget(const T*& p) { asm("" : "+r"(p)); }
 
-  // Connections that stretch or bend (eq. 2 to 5). Those that bend take their roots from the
-  // processor's divider, which works beside its multipliers: faster than either alone. Vectors are
-  // formed twice: to keep them would take more registers than there are.
+  // Of every connection that stretches or bends (eq. 2 to 5). Those that bend take their roots from
+  // the processor's divider, which works beside its multipliers: faster than either alone.
+  using Pulls = Each<V, std::size(kConnections)>;
   template <bool kBorder, std::size_t... s, std::size_t... b>
-  HWY_INLINE void add_springs(const Row& row, const Place& p, Forces& f, Connections<s...>,
-                              Connections<b...>) const {
+  HWY_INLINE Pulls pull(const Row& row, const Place& p, Connections<s...>,
+                        Connections<b...>) const {
     const D d;
     const Each<V, sizeof...(s)> l2{squared(ends<s>(p.seen, p.seen1, p.seen2))...};
     [[maybe_unused]] const Each<V, sizeof...(b)> l{length(ends<b>(p.seen, p.seen1, p.seen2))...};
     const Each<V, sizeof...(s)> y = inverse_sqrt(d, l2);
     [[maybe_unused]] std::size_t i = 0, j = 0;
-    const Each<V, sizeof...(s) + sizeof...(b)> pulls{
-        existing<kBorder, s>(p, stretch_pull<s>(row, y[i++]))...,
-        existing<kBorder, b>(p, bend_pull<b>(row, l[j++]))...};
+    Pulls pulls{};
+    ((pulls[s] = existing<kBorder, s>(p, stretch_pull<s>(row, y[i++]))), ...);
+    ((pulls[b] = existing<kBorder, b>(p, bend_pull<b>(row, l[j++]))), ...);
+    return pulls;
+  }
+
+  // Vectors are formed again: to keep them would take more registers than there are.
+  template <std::size_t... s, std::size_t... b>
+  static HWY_INLINE void add(const Place& p, const Pulls& pulls, Forces& f, Connections<s...>,
+                             Connections<b...>) {
     const T *seen = p.seen, *seen1 = p.seen1, *seen2 = p.seen2;
     forget(seen);
     forget(seen1);
     forget(seen2);
-    i = 0;
-    (add<s>(p, ends<s>(seen, seen1, seen2), pulls[i++], f), ...);
-    (add<b>(p, ends<b>(seen, seen1, seen2), pulls[i++], f), ...);
+    (add<s>(p, ends<s>(seen, seen1, seen2), pulls[s], f), ...);
+    (add<b>(p, ends<b>(seen, seen1, seen2), pulls[b], f), ...);
   }
 
   // Stencils 1, -2, 1 along row r + 1 and down the column, and 1, -1, -1, 1 over the cell between
@@ -440,30 +447,41 @@ class Sweep {
   template <bool kBorder>
   HWY_INLINE void damp(const Row& row, const Place& p, Forces& f) const {
     const D d;
-    const V damping = hn::Set(d, law_.damping);
-    const auto w = [&](int right)
-                       HWY_ATTR { return load(p.seen2 + right * kSeen + State::kW * kLanes); };
-    const Triple<V> here = w(0);
-    const Triple<V> near = plus(plus(w(-1), here), w(1));
-    Triple<V> sum = plus(near, load(p.heard));
     V count =
         hn::Mul(kBorder ? column(p, kNearCount) : hn::Set(d, T(3)), hn::Set(d, row.near_rows));
     if (law_.damp_far) {
-      const Triple<V> beside = plus(plus(w(-2), here), w(2));
-      const Triple<V> far = law_.damp_far_diagonal ? beside : here;
-      sum = plus(sum, beside);
-      store(plus(near, load(p.heard + 3 * kLanes)), p.heard);
-      store(far, p.heard + 3 * kLanes);
-      f.own = plus_times(f.own, far, damping);
       const V columns = kBorder ? column(p, kFarCount) : hn::Set(d, T(3));
       count = law_.damp_far_diagonal
                   ? hn::MulAdd(columns, hn::Set(d, row.far_rows), count)
                   : hn::Add(hn::Add(columns, hn::Set(d, row.far_rows - 1)), count);
-    } else {
-      store(near, p.heard);
     }
-    f.next = plus_times(f.next, near, damping);
-    f.after = plus_times(f.after, minus_times(sum, here, count), damping);
+    damp_axis<0>(p, count, f.own.x, f.next.x, f.after.x);
+    damp_axis<1>(p, count, f.own.y, f.next.y, f.after.y);
+    damp_axis<2>(p, count, f.own.z, f.next.z, f.after.z);
+  }
+  template <int kAxis>
+  HWY_INLINE void damp_axis(const Place& p, V count, V& own, V& next, V& after) const {
+    const D d;
+    const V damping = hn::Set(d, law_.damping);
+    const auto w = [&](int right) HWY_ATTR {
+      return hn::Load(d, p.seen2 + right * kSeen + (State::kW + kAxis) * kLanes);
+    };
+    T* const heard = p.heard + kAxis * kLanes;
+    const V here = w(0);
+    const V near = hn::Add(hn::Add(w(-1), here), w(1));
+    V sum = hn::Add(near, hn::Load(d, heard));
+    if (law_.damp_far) {
+      const V beside = hn::Add(hn::Add(w(-2), here), w(2));
+      const V far = law_.damp_far_diagonal ? beside : here;
+      sum = hn::Add(sum, beside);
+      hn::Store(hn::Add(near, hn::Load(d, heard + 3 * kLanes)), d, heard);
+      hn::Store(far, d, heard + 3 * kLanes);
+      own = hn::MulAdd(far, damping, own);
+    } else {
+      hn::Store(near, d, heard);
+    }
+    next = hn::MulAdd(near, damping, next);
+    after = hn::MulAdd(hn::NegMulAdd(here, count, sum), damping, after);
   }
 
   // Eq. 7 and 8: drag centred, Verlet in summed form.

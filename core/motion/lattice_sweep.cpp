@@ -126,6 +126,10 @@ class Sweep {
     const D d;
     return {hn::Load(d, p), hn::Load(d, p + kLanes), hn::Load(d, p + 2 * kLanes)};
   }
+  static HWY_INLINE Triple<V> load_shifted(const T* p) {
+    const D d;
+    return {hn::LoadU(d, p), hn::LoadU(d, p + kLanes), hn::LoadU(d, p + 2 * kLanes)};
+  }
   static HWY_INLINE void store(const Triple<V>& v, T* p) {
     const D d;
     hn::Store(v.x, d, p);
@@ -146,11 +150,13 @@ class Sweep {
     if (r >= law_.layout.rows) return;
     T* const row = state_.seen(band_, r);
     const auto copy = [&](const T* from, T* to, const T* mask) HWY_ATTR {
-      for (int plane = 0; plane < planes_; ++plane)
-        for (int part = 0; part < kLanes; part += kPart) {
+      for (int part = 0; part < kLanes; part += kPart) {
+        const V exists = hn::Load(d, mask + part);
+        for (int plane = 0; plane < planes_; plane += 3) {
           const int at = plane * kLanes + part;
-          hn::Store(hn::And(hn::LoadU(d, from + at), hn::Load(d, mask + part)), d, to + at);
+          store(only(load_shifted(from + at), exists), to + at);
         }
+      }
     };
     for (const int j : law_.padded)
       copy(row + j * kSeen, row + j * kSeen,
@@ -167,12 +173,9 @@ class Sweep {
     for (std::size_t k = 0; k < halo_.size(); ++k)
       for (int part = 0; part < kLanes; part += kPart) {
         const V mask = hn::Load(d, law_.halo_folds.data() + k * kLanes + part);
-        for (int axis = 0; axis < 3; ++axis) {
-          const int at = axis * kLanes + part;
-          const T* const from = row + halo_[k].at * kForces + at - halo_[k].shift;
-          T* const to = row + halo_[k].vector * kForces + at;
-          hn::Store(hn::Add(hn::Load(d, to), hn::And(hn::LoadU(d, from), mask)), d, to);
-        }
+        const T* const from = row + halo_[k].at * kForces + part - halo_[k].shift;
+        T* const to = row + halo_[k].vector * kForces + part;
+        store(plus(load(to), only(load_shifted(from), mask)), to);
       }
     // for row r + 3; to the right of it, too, nothing is left of these
     for (std::size_t k = 0; k < (kStartsRows ? kHalo : halo_.size()); ++k)

@@ -199,6 +199,17 @@ Outcome run(const Case& given, Accuracy accuracy, int frames) {
   return run(Simulation(std::move(scene)), frames);
 }
 
+double rounding(const Case& given, const BendingLaw& law, int frames) {
+  Scene scene = given.scene;
+  scene.sheets[0].bending = law;
+  scene.solver.substep = scene.solver.frame_step / static_cast<double>(given.substeps);
+  const auto end = [&](Precision precision) {
+    scene.solver.precision = precision;
+    return run(Simulation(scene), frames).x;
+  };
+  return rms(end(Precision::kSingle) - end(Precision::kDouble));
+}
+
 int calm_frames(const Case& given, int most) {
   constexpr double kCalm = 1e-3;  // m
   Simulation coarse = begin(given, {.precision = Precision::kDouble});

@@ -63,6 +63,9 @@ Outcome run(const Case& given, Accuracy accuracy, int frames);
 // Frames, at most `most`, in which runs at the planned step and at half of it stay within 1 mm.
 int calm_frames(const Case& given, int most);
 
+// How far apart runs in single and in double precision are at the planned step (RMS), m.
+double rounding(const Case& given, const BendingLaw& law, int frames);
+
 double rms(const Matrix3Xd& difference);
 double largest(const Matrix3Xd& difference);
 

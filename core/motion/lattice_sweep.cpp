@@ -268,7 +268,7 @@ class Sweep {
     Forces f{load(p.force), load(p.force1), load(p.force2)};
     if constexpr (!kStartsRows) store(zero(), p.force);  // for row r + 3
     if (law_.damping > 0 && row.after) damp<kBorder>(row, p, f);
-    add(p, pulls, f, springs(), bends());
+    add_pulls(p, pulls, f, springs(), bends());
     if constexpr (kIsometric) add_isometric<kBorder>(row, p, f);
     if (law_.wind.blows && row.after) add_wind<kBorder>(p, f);
     store(f.next, p.force1);
@@ -340,8 +340,9 @@ class Sweep {
   // Keeps the compiler from keeping what it has read through p.
   static HWY_INLINE void forget(const T*& p) { asm("" : "+r"(p)); }
 
-  // Of every connection that stretches or bends (eq. 2 to 5). Those that bend take their roots from
-  // the processor's divider, which works beside its multipliers: faster than either alone.
+  // Of connections that stretch or bend (eq. 2 to 5), by their numbers. Those that bend take their
+  // roots from the processor's divider, which works beside its multipliers: faster than either
+  // alone.
   using Pulls = Each<V, std::size(kConnections)>;
   template <bool kBorder, std::size_t... s, std::size_t... b>
   HWY_INLINE Pulls pull(const Row& row, const Place& p, Connections<s...>,
@@ -359,8 +360,8 @@ class Sweep {
 
   // Vectors are formed again: to keep them would take more registers than there are.
   template <std::size_t... s, std::size_t... b>
-  static HWY_INLINE void add(const Place& p, const Pulls& pulls, Forces& f, Connections<s...>,
-                             Connections<b...>) {
+  static HWY_INLINE void add_pulls(const Place& p, const Pulls& pulls, Forces& f, Connections<s...>,
+                                   Connections<b...>) {
     const T *seen = p.seen, *seen1 = p.seen1, *seen2 = p.seen2;
     forget(seen);
     forget(seen1);
@@ -458,6 +459,7 @@ class Sweep {
                   ? hn::MulAdd(columns, hn::Set(d, row.far_rows), count)
                   : hn::Add(hn::Add(columns, hn::Set(d, row.far_rows - 1)), count);
     }
+    // one after the other: together they would take more registers than there are
     damp_axis<0>(p, count, f.own.x, f.next.x, f.after.x);
     damp_axis<1>(p, count, f.own.y, f.next.y, f.after.y);
     damp_axis<2>(p, count, f.own.z, f.next.z, f.after.z);

@@ -453,16 +453,13 @@ class AccuracyPage {
     if (over.empty()) page_.text("It is nowhere more.");
     for (const Case* given : over) {
       constexpr int kFrames = 2;
-      page_.text(
-          fmt::format("**It is more in {}.** In single precision neighbours of a coordinate of 1 m "
-                      "lie 1.2e-07 m "
-                      "apart, and where connections are near their rest length those that only "
-                      "pull (eq. 2) make "
-                      "a pull of rounding to either side: after {} frames single and double are {} "
-                      "m apart there "
-                      "(RMS), {} m with the isometric law, whose connections push as well.",
-                      given->title(), kFrames, short_number(rounding(*given, ChoiKo{}, kFrames)),
-                      short_number(rounding(*given, Isometric{}, kFrames))));
+      page_.text(fmt::format(
+          "**It is more in {}.** In single precision neighbours of a coordinate of 1 m lie 1.2e-07 "
+          "m apart, and where connections are near their rest length those that only pull (eq. 2) "
+          "make a pull of rounding to either side: after {} frames single and double are {} m "
+          "apart there (RMS), {} m with the isometric law, whose connections push as well.",
+          given->title(), kFrames, short_number(rounding(*given, ChoiKo{}, kFrames)),
+          short_number(rounding(*given, Isometric{}, kFrames))));
     }
   }
 

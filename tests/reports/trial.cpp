@@ -119,9 +119,9 @@ Scene scene_of(const std::string& name, int side) {
   throw std::invalid_argument("no scene " + name);
 }
 
-Simulation begin(const Case& given, const Setting& setting) {
+Simulation begin(const Case& given, const Setting& setting, const BendingLaw& law) {
   Scene scene = given.scene;
-  scene.sheets[0].bending = setting.law;
+  scene.sheets[0].bending = law;
   scene.solver.integrator = setting.integrator;
   scene.solver.precision = setting.precision;
   scene.solver.plain = setting.plain;
@@ -130,6 +130,9 @@ Simulation begin(const Case& given, const Setting& setting) {
   scene.solver.allow_unstable = true;
   scene.solver.max_repairs = 0;
   return Simulation(std::move(scene));
+}
+Simulation begin(const Case& given, const Setting& setting) {
+  return begin(given, setting, setting.law);
 }
 
 Outcome run(Simulation simulation, int frames) {
@@ -200,12 +203,8 @@ Outcome run(const Case& given, Accuracy accuracy, int frames) {
 }
 
 double rounding(const Case& given, const BendingLaw& law, int frames) {
-  Scene scene = given.scene;
-  scene.sheets[0].bending = law;
-  scene.solver.substep = scene.solver.frame_step / static_cast<double>(given.substeps);
   const auto end = [&](Precision precision) {
-    scene.solver.precision = precision;
-    return run(Simulation(scene), frames).x;
+    return run(begin(given, {.precision = precision}, law), frames).x;
   };
   return rms(end(Precision::kSingle) - end(Precision::kDouble));
 }

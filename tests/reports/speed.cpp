@@ -102,7 +102,13 @@ class SpeedPage {
     std::vector<Cells> rows;
     Plot plot{
         "f_b: time against error", "time ns", "largest relative error", {}, true, false, true};
-    plot.series = {{"one by one", {}}, {"in vectors", {}}};
+    std::map<std::string, Series> lines;
+    const auto add = [&](const std::string& evaluator, const char* how, const Run* run) {
+      if (!run || run->error == 0) return;  // there is no logarithm of 0
+      const std::string kind = evaluator.substr(0, evaluator.find('/')) + ", " + how;
+      lines[kind].name = kind;
+      lines[kind].points.emplace_back(run->item_time(), run->error);
+    };
     for (const char* evaluator :
          {"SERIES", "EXACT", "LINEARIZED/2", "LINEARIZED/5", "LINEARIZED/16", "LINEARIZED/32",
           "LINEARIZED/60", "LINEARIZED/256", "LINEARIZED/1024", "OPTIMAL/2", "OPTIMAL/5",
@@ -115,9 +121,10 @@ class SpeedPage {
       rows.push_back({evaluator, error ? number(error->error) : "",
                       vector_error ? number(vector_error->error) : "", time(scalar), time(vector),
                       times(series, scalar), times(vector_series, vector), times(series, vector)});
-      if (scalar) plot.series[0].points.emplace_back(scalar->item_time(), scalar->error);
-      if (vector) plot.series[1].points.emplace_back(vector->item_time(), vector->error);
+      add(evaluator, "one by one", scalar);
+      add(evaluator, "in vectors", vector);
     }
+    for (const auto& [kind, line] : lines) plot.series.push_back(line);
     page_.table(
         {"evaluator", "error", "error in vectors", "one by one, " + unit, "in vectors, " + unit,
          "one by one / one by one", "vectors / vectors", "one by one / vectors"},

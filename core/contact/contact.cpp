@@ -85,13 +85,15 @@ bool Contacts::resolve(Vector3d& x, Vector3d& d) const {
 
       // out to the skin; the push takes away approach but never adds speed
       x += depth * normal;
-      d += std::clamp(-approach, 0.0, depth) * normal;
+      const double push = std::clamp(-approach, 0.0, depth);
+      d += push * normal;
 
-      // Coulomb: the push bounds how much sliding it can stop
+      // Coulomb: the push bounds how much sliding it can stop, not the depth, which on a curved
+      // body differs from it by how far the surface falls away
       const Vector3d sliding = relative - approach * normal;
       const double length = sliding.norm();
       if (length == 0) continue;
-      const Vector3d stopped = std::min(1.0, mu * depth / length) * sliding;
+      const Vector3d stopped = std::min(1.0, mu * push / length) * sliding;
       x -= stopped;
       d -= stopped;
     }

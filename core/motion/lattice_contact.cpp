@@ -110,11 +110,12 @@ HWY_INLINE void resolve_places(const Contacts& contacts, M active, Places& x, Pl
       const Reals approach = dot(relative, normal);
 
       x = plus_times(x, normal, depth);
-      d = plus_times(d, normal, hn::Min(hn::Max(hn::Neg(approach), zero), depth));
+      const Reals push = hn::Min(hn::Max(hn::Neg(approach), zero), depth);
+      d = plus_times(d, normal, push);
 
       const Places sliding = minus_times(relative, normal, approach);
       const Reals length = hn::Sqrt(squared(sliding));
-      const Reals most = hn::Div(hn::Mul(real(placed.friction), depth), length);
+      const Reals most = hn::Div(hn::Mul(real(placed.friction), push), length);
       const Reals share =
           hn::IfThenElseZero(hn::And(touching, hn::Gt(length, zero)), hn::Min(real(1), most));
       x = minus_times(x, sliding, share);

@@ -31,24 +31,41 @@ double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& me
   return rate;
 }
 
-StepPlan plan_step(const Scene& scene, const std::vector<SheetShape>& shapes) {
+// Of each sheet.
+std::vector<StableStep> stable_steps(const Scene& scene, const std::vector<SheetShape>& shapes) {
+  std::vector<StableStep> steps;
+  for (std::size_t s = 0; s < shapes.size(); ++s) {
+    const auto& [mesh, inverse_mass, x] = shapes[s];
+    steps.push_back(stable_step(mesh, inverse_mass, scene.solver.integrator,
+                                air_rate(scene, scene.sheets[s], mesh), x));
+  }
+  return steps;
+}
+
+// The longest step that a sheet's damping bears, as a share of its linear bound.
+double share_of(const SolverSettings& solver, const StableStep& stable) {
+  if (solver.integrator != IntegratorKind::kVerlet) return solver.safety;
+  return std::min(solver.safety, safe_share(stable.connection_ratio));
+}
+
+StepPlan plan_step(const Scene& scene, const std::vector<StableStep>& sheets) {
   const SolverSettings& solver = scene.solver;
   StepPlan step;
   step.linear_bound = step.estimated_bound = std::numeric_limits<double>::infinity();
-  for (std::size_t s = 0; s < shapes.size(); ++s) {
-    const SheetDefinition& sheet = scene.sheets[s];
-    const StableStep stable = stable_step(shapes[s].mesh, shapes[s].inverse_mass, solver.integrator,
-                                          air_rate(scene, sheet, shapes[s].mesh), shapes[s].x);
+  double safe = step.linear_bound;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const StableStep& stable = sheets[s];
+    safe = std::min(safe, share_of(solver, stable) * stable.linear_bound);
     step.estimated_bound = std::min(step.estimated_bound, stable.estimate);
     if (s > 0 && stable.linear_bound >= step.linear_bound) continue;
     step.linear_bound = stable.linear_bound;
     step.damping_ratio = stable.damping_ratio;
-    step.limiting_sheet = sheet.name;
+    step.limiting_sheet = scene.sheets[s].name;
   }
 
   // an asked step that divides the frame step up to rounding is taken as it is
   constexpr double kRounding = 1e-9;
-  const double longest = solver.substep.value_or(solver.safety * step.linear_bound);
+  const double longest = solver.substep.value_or(safe);
   const double count = std::ceil(solver.frame_step / longest * (1 - kRounding));
   step.substeps = static_cast<std::int64_t>(std::clamp(count, 1.0, 1e18));
   step.substep = solver.frame_step / static_cast<double>(step.substeps);
@@ -216,7 +233,47 @@ void describe_stretch(const Scene& scene, std::size_t index, Plan& plan) {
             100 * most, " % under its own weight (solver.max_self_weight_strain)")});
 }
 
-void warn(const Scene& scene, const std::vector<SheetShape>& shapes, Plan& plan) {
+// Where damping is so low that energy may come from nothing.
+void warn_of_damping(const Scene& scene, const std::vector<SheetShape>& shapes, std::size_t index,
+                     const StableStep& stable, Plan& plan) {
+  const Textile& textile = scene.sheets[index].textile;
+  const Mesh& mesh = shapes[index].mesh;
+  const double ratio = stable.connection_ratio;
+  const std::string field = sheet_path(index) + ".textile";
+  constexpr const char* kWhy =
+      ": connections that switch between taut and slack gain energy from nothing";
+  if (!textile.damping && !textile.damping_ratio && mesh.damping > kDefaultDamping) {
+    plan.warnings.push_back(
+        {"UNDERDAMPED", field,
+         join("gives no damping, and the default of ", kDefaultDamping,
+              " kg/s would be a damping ratio of ", ratio * kDefaultDamping / mesh.damping,
+              " of the stiffest mode", kWhy, ". Simulated with ", mesh.damping,
+              " kg/s, a ratio of ", ratio, ", which costs less than 1 % of the step")});
+    return;
+  }
+  const double safe = share_of(scene.solver, stable) * stable.linear_bound;
+  const double enough = damping_for(mesh, kSafeDampingRatio);
+  if (scene.solver.integrator != IntegratorKind::kVerlet || safe_share(ratio) == 1) return;
+  if (const auto& asked = scene.solver.substep; asked && *asked > safe * (1 + 1e-9))
+    plan.warnings.push_back(
+        {"UNDERDAMPED", field,
+         join("has a damping of ", mesh.damping, " kg/s, a ratio of ", ratio,
+              " of the stiffest mode: at the substep asked for, ", *asked,
+              " s, connections that switch between taut and slack may gain energy from nothing. "
+              "Give damping_kg_per_s ",
+              enough, " or damping_ratio ", kSafeDampingRatio, ", or a substep of ", safe, " s")});
+  else if (!asked && safe < scene.solver.safety * stable.linear_bound)
+    plan.warnings.push_back(
+        {"UNDERDAMPED", field,
+         join("has a damping of ", mesh.damping, " kg/s, a ratio of ", ratio,
+              " of the stiffest mode", kWhy, ". So it takes ",
+              scene.solver.safety * stable.linear_bound / safe,
+              " times the substeps; damping_kg_per_s ", enough, " or damping_ratio ",
+              kSafeDampingRatio, " would need none of that")});
+}
+
+void warn(const Scene& scene, const std::vector<SheetShape>& shapes,
+          const std::vector<StableStep>& steps, Plan& plan) {
   plan.warnings.push_back({"NO_SELF_COLLISION", "", "a sheet may pass through itself"});
   if (scene.sheets.size() > 1)
     plan.warnings.push_back(
@@ -230,6 +287,7 @@ void warn(const Scene& scene, const std::vector<SheetShape>& shapes, Plan& plan)
   for (std::size_t s = 0; s < shapes.size(); ++s) {
     warn_of_bending(scene, s, shapes[s].mesh, plan);
     warn_of_tension(scene.sheets[s], s, plan);
+    warn_of_damping(scene, shapes, s, steps[s], plan);
     describe_stretch(scene, s, plan);
   }
   if (plan.step.substep > plan.step.linear_bound)
@@ -250,8 +308,11 @@ std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettin
 
 Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes) {
   Plan plan;
-  plan.step = plan_step(scene, shapes);
+  const std::vector<StableStep> steps = stable_steps(scene, shapes);
+  plan.step = plan_step(scene, steps);
   for (std::size_t s = 0; s < shapes.size(); ++s) {
+    plan.dampings.push_back(
+        {scene.sheets[s].name, shapes[s].mesh.damping, steps[s].connection_ratio});
     describe_solver(scene, scene.sheets[s], plan);
     describe_families(scene.sheets[s], shapes[s].mesh, plan);
     plan.particle_substeps += scene.sheets[s].particle_count() / plan.step.substep;
@@ -264,7 +325,7 @@ Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes) {
   };
   pass("wind", scene.environment.wind.has_value(), "the scene has none");
   pass("contact", !scene.colliders.empty(), "the scene has no collider");
-  warn(scene, shapes, plan);
+  warn(scene, shapes, steps, plan);
   return plan;
 }
 

@@ -43,6 +43,13 @@ struct StretchCost {
   double self_weight_strain = 0;  // as given; the larger one of warp and weft
 };
 
+// Internal damping as a sheet has it.
+struct SheetDamping {
+  std::string sheet;
+  double damping = 0;  // k_d, kg/s
+  double ratio = 0;    // of its stiffest mode; infinity where nothing is stiff
+};
+
 // What a scene needs: derived once, before the run.
 struct Plan {
   StepPlan step;
@@ -50,6 +57,7 @@ struct Plan {
   std::vector<SkippedPass> skipped;
   std::vector<BendingLimit> bending_limits;  // of sheets with CHOI_KO bending
   std::vector<StretchCost> stretch_costs;
+  std::vector<SheetDamping> dampings;
   std::vector<Warning> warnings;
   double particle_substeps = 0;  // of a simulated second
 };

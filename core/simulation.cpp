@@ -10,8 +10,10 @@
 #include "core/forces/air.h"
 #include "core/forces/springs.h"
 #include "core/model/self_weight.h"
+#include "core/motion/energy_budget.h"
 #include "core/motion/guard.h"
 #include "core/motion/sheet_solver.h"
+#include "core/motion/stability.h"
 
 namespace weft {
 namespace {
@@ -26,6 +28,7 @@ struct Sheet {
   std::unique_ptr<SheetSolver> solver;
   double skin = 0;  // m
   double most_strain = kMostStrain;
+  EnergyBudget budget;
   std::optional<TextileRamp> ramp;
 
   // At the end of the last frame. Between frames it is what the solver holds.
@@ -83,6 +86,11 @@ void lead_pins(const SheetDefinition& definition, double time, double dt, Sheet&
   }
 }
 
+// From which a sheet may fall within itself, m.
+double height_of(const SheetDefinition& sheet) {
+  return (std::max(sheet.grid.rows, sheet.grid.columns) - 1) * sheet.grid.spacing;
+}
+
 // 1/kg, 0 where a pin holds a particle.
 VectorXd inverse_mass_of(const Mesh& mesh, const std::vector<Pin>& pins) {
   VectorXd inverse_mass = mesh.mass.cwiseInverse();
@@ -93,6 +101,10 @@ VectorXd inverse_mass_of(const Mesh& mesh, const std::vector<Pin>& pins) {
 
 void set_textile_of(const Scene& scene, const SheetDefinition& definition, Sheet& sheet) {
   sheet.mesh = make_lattice(definition);
+  if (const auto& ratio = definition.textile.damping_ratio)
+    sheet.mesh.damping = damping_for(sheet.mesh, *ratio);
+  else if (!definition.textile.damping)
+    sheet.mesh.damping = std::max(kDefaultDamping, damping_for(sheet.mesh, kSafeDampingRatio));
   if (!scene.environment.wind) sheet.mesh.triangles = std::vector<std::array<int, 3>>();
   sheet.dynamics.inverse_mass = inverse_mass_of(sheet.mesh, definition.pins);
   sheet.dynamics.drag = sheet.mesh.drag;
@@ -149,6 +161,7 @@ struct Simulation::State {
   std::string failure;
 
   State(Scene given, SolverFactory factory);
+  SheetDefinition capped(std::size_t sheet) const;
   SheetDefinition stepped(std::size_t sheet) const;
   void put_textile(std::size_t sheet, const Textile& textile);
   Plan plan_now() const;
@@ -158,6 +171,8 @@ struct Simulation::State {
   void step(double time, double dt, Crew& crew);
   bool compute_frame(Crew& crew, NextStates& next);
   Attempt attempt(Crew& crew, NextStates& next);
+  bool keep_to_budget(NextStates& next);
+  void go_on_from(NextStates& next);
   bool quiet(const NextStates& next) const;
   void set_halvings(int count);
   Handling handling() const;
@@ -171,11 +186,18 @@ struct Simulation::State {
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
 };
 
-// A sheet as it is simulated.
-SheetDefinition Simulation::State::stepped(std::size_t sheet) const {
+// A sheet as it is simulated, but for its damping.
+SheetDefinition Simulation::State::capped(std::size_t sheet) const {
   SheetDefinition definition = scene.sheets[sheet];
   if (const auto& strain = scene.solver.max_self_weight_strain)
     definition.textile = cap_stretch(definition, scene.environment, *strain);
+  return definition;
+}
+
+// A sheet as it is simulated, once it has a mesh.
+SheetDefinition Simulation::State::stepped(std::size_t sheet) const {
+  SheetDefinition definition = capped(sheet);
+  definition.textile.damping = sheets[sheet].mesh.damping;
   return definition;
 }
 
@@ -220,7 +242,7 @@ Simulation::State::State(Scene given, SolverFactory factory)
       rest_after(end_of_paths(scene)) {
   std::vector<Matrix3Xd> x(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s) {
-    const SheetDefinition definition = stepped(s);
+    const SheetDefinition definition = capped(s);
     set_textile_of(scene, definition, sheets[s]);
     x[s] = start_positions(definition);
     for (const Pin& pin : definition.pins)
@@ -302,6 +324,7 @@ void Simulation::State::go_on(const Course& course, double old_dt,
                               const std::vector<bool>& changed) {
   const double dt = plan.step.substep;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
+    sheets[s].budget = {};
     if (!changed[s] && dt == old_dt) continue;
     sheets[s].solver->start(course.x[s], course.v[s], time(), dt);
     sheets[s].read_good();
@@ -310,7 +333,7 @@ void Simulation::State::go_on(const Course& course, double old_dt,
 
 void Simulation::State::put_textile(std::size_t sheet, const Textile& textile) {
   scene.sheets[sheet].textile = textile;
-  set_textile_of(scene, stepped(sheet), sheets[sheet]);
+  set_textile_of(scene, capped(sheet), sheets[sheet]);
 }
 
 Plan Simulation::State::plan_now() const {
@@ -369,8 +392,7 @@ bool Simulation::State::quiet(const NextStates& next) const {
   const double most_change = kForceShare * gravity * scene.solver.frame_step;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const Sheet& sheet = sheets[s];
-    const Grid& grid = scene.sheets[s].grid;
-    const double height = (std::max(grid.rows, grid.columns) - 1) * grid.spacing;
+    const double height = height_of(scene.sheets[s]);
     const Matrix3Xd &v = next[s].v, &before = sheet.good().v;
     double energy = 0;
     for (Eigen::Index i = 0; i < v.cols(); ++i) {
@@ -420,13 +442,7 @@ bool Simulation::State::compute_frame(Crew& crew, NextStates& next) {
         sheets[s].most_strain = std::max(sheets[s].most_strain, 2 * made.sheets[s].strain);
       set_halvings(doubtful->halvings);
       repairs.resize(repairs_before + static_cast<std::size_t>(halvings - halvings_before));
-      for (std::size_t s = 0; s < sheets.size(); ++s) {
-        Matrix3Xd v;
-        const double end = time() + scene.solver.frame_step;
-        sheets[s].solver->closing_velocities(end, v);
-        sheets[s].solver->start(next[s].x, v, end, plan.step.substep);
-        sheets[s].read(next[s]);
-      }
+      go_on_from(next);
       return true;
     }
 
@@ -442,6 +458,49 @@ bool Simulation::State::compute_frame(Crew& crew, NextStates& next) {
       sheet.solver->start(sheet.good().x, sheet.good().v, time(), plan.step.substep);
     doubtful = std::move(made);
   }
+}
+
+// Solvers go on from the end of the frame with the step as it now is.
+void Simulation::State::go_on_from(NextStates& next) {
+  const double end = time() + scene.solver.frame_step;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    Matrix3Xd v;
+    sheets[s].solver->closing_velocities(end, v);
+    sheets[s].solver->start(next[s].x, v, end, plan.step.substep);
+    sheets[s].read(next[s]);
+  }
+}
+
+// Halves the step from the frame's end on where energy came from nothing; false: repairs are used
+// up.
+bool Simulation::State::keep_to_budget(NextStates& next) {
+  if (scene.solver.max_repairs == 0) return true;
+  const double begin = time(), frame_step = scene.solver.frame_step;
+  std::string reason;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const SheetDefinition& definition = scene.sheets[s];
+    const Mesh& mesh = sheets[s].mesh;
+    EnergyBudget& budget = sheets[s].budget;
+    const Drive drive{scene.environment.gravity,
+                      motion_speed(scene, definition, begin, begin + frame_step), frame_step};
+    budget.given += work_of_motion(mesh, drive, budget.stored);
+    budget.substeps += plan.step.substeps;
+    if (budget.substeps < kAuditSubsteps) continue;
+    const std::string why =
+        audit(mesh, drive, height_of(definition), wind_speed(scene), next[s], budget);
+    if (reason.empty() && !why.empty()) reason = definition.name + ": " + why;
+  }
+  if (reason.empty()) return true;
+  if (halvings >= scene.solver.max_repairs || 2 * plan.step.substeps > kMaxSubsteps) {
+    failure = "frame " + std::to_string(frame + 1) + " cannot be trusted after " +
+              std::to_string(halvings) + " halvings of the step: " + reason;
+    return false;
+  }
+  set_halvings(halvings + 1);
+  repairs.push_back({frame + 1, plan.step.substep, reason});
+  go_on_from(next);
+  for (Sheet& sheet : sheets) sheet.budget = {};
+  return true;
 }
 
 void Simulation::State::set_halvings(int count) {
@@ -481,6 +540,7 @@ bool Simulation::advance_frame(Crew& crew) {
   if (!state.failure.empty() || !state.change_textiles() || !state.compute_frame(crew, next))
     return false;
   state.substeps = state.plan.step.substeps;
+  if (!state.keep_to_budget(next)) return false;
   state.frames_at_rest = state.quiet(next) ? state.frames_at_rest + 1 : 0;
   for (std::size_t s = 0; s < next.size(); ++s) state.sheets[s].set_good(next[s]);
   ++state.frame;
@@ -660,7 +720,7 @@ Snapshot Simulation::snapshot() const {
   for (std::size_t s = 0; s < state.sheets.size(); ++s) {
     const Sheet& sheet = state.sheets[s];
     snapshot.sheets.push_back({state.scene.sheets[s].textile, sheet.most_strain, sheet.good().x,
-                               sheet.good().v, sheet.solver->save(), sheet.ramp});
+                               sheet.good().v, sheet.solver->save(), sheet.ramp, sheet.budget});
   }
   return snapshot;
 }
@@ -695,6 +755,7 @@ bool Simulation::State::take_over(const Snapshot& snapshot) {
     const Snapshot::Sheet& saved = snapshot.sheets[s];
     sheet.most_strain = saved.most_strain;
     sheet.ramp = saved.ramp;
+    sheet.budget = saved.budget;
     sheet.solver->start(saved.x, saved.v, time(), plan.step.substep);
     if (!sheet.solver->load(saved.solver)) return false;
   }

@@ -7,6 +7,7 @@
 
 #include "core/model/handling.h"
 #include "core/model/mesh.h"
+#include "core/motion/energy_budget.h"
 #include "core/plan.h"
 
 namespace weft {
@@ -27,6 +28,7 @@ struct Snapshot {
     Matrix3Xd x, v;          // (3 x particles) m, m/s
     std::string solver;      // SheetSolver::save()
     std::optional<TextileRamp> ramp = {};
+    EnergyBudget budget = {};
   };
   std::int64_t frame = 0;
   std::int64_t substeps = 0;  // that the frame took

@@ -159,9 +159,12 @@ std::string plan_text(const v1::Plan& plan, const v1::ServerStats* stats) {
   } else {
     facts.add("linear bound", "none for this integrator");
   }
-  facts.add("close estimate", seconds_text(plan.estimated_bound_s()) + ", for the present shape")
-      .add("damping ratio",
-           number_text(plan.damping_ratio()) + " of the stiffest mode, 1 is critical");
+  facts.add("close estimate", seconds_text(plan.estimated_bound_s()) + ", for the present shape");
+  for (const auto& damping : plan.dampings()) {
+    facts.add("damping", fmt::format("{}: {} kg/s, {} of critical in its stiffest mode",
+                                     damping.sheet(), number_text(damping.damping_kg_per_s()),
+                                     number_text(damping.damping_ratio())));
+  }
   facts.add("cost", fmt::format("{:.3g} million particle-substeps for a second",
                                 plan.particle_substeps_per_second() / 1e6));
   if (const auto time = stats != nullptr ? seconds_of(plan, *stats) : std::nullopt) {

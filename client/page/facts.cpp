@@ -62,7 +62,12 @@ Rows sheet_rows(const v1::Sheet& sheet) {
     rows.emplace_back("c_b, clamp", value_text(values.clamp_n_per_m(), "N/m"));
     rows.emplace_back("air drag", value_text(values.air_drag_kg_per_s(), "kg/s"));
   }
-  rows.emplace_back("damping", value_text(textile.damping_kg_per_s(), "kg/s"));
+  if (textile.has_damping_ratio())
+    rows.emplace_back("damping", value_text(textile.damping_ratio(), "of critical"));
+  else if (textile.has_damping_kg_per_s())
+    rows.emplace_back("damping", value_text(textile.damping_kg_per_s(), "kg/s"));
+  else
+    rows.emplace_back("damping", "default");
   rows.emplace_back("friction", number_text(textile.friction_coefficient()));
   rows.emplace_back("bending law", bending_text(sheet.bending()));
   return rows;

@@ -136,7 +136,7 @@ Mesh make_lattice(const SheetDefinition& sheet) {
   const LatticeConstants k = lattice_constants(sheet);
 
   Mesh mesh;
-  mesh.damping = sheet.textile.damping;
+  mesh.damping = sheet.textile.damping.value_or(kDefaultDamping);
 
   // mass and drag: of the area that belongs to a particle, or one for all
   mesh.mass.resize(sheet.particle_count());

@@ -107,7 +107,9 @@ void check_model(const RawTextile& t, const std::string& field, Check& check) {
 
 void check_textile(const Textile& textile, const std::string& field, Check& check) {
   std::visit([&](const auto& model) { check_model(model, field, check); }, textile.model);
-  check.number(field + ".damping_kg_per_s", textile.damping, 0, 1000, "kg/s");
+  if (textile.damping) check.number(field + ".damping_kg_per_s", *textile.damping, 0, 1000, "kg/s");
+  if (textile.damping_ratio)
+    check.number(field + ".damping_ratio", *textile.damping_ratio, 0, 1, "of critical damping");
   check.number(field + ".friction_coefficient", textile.friction, 0, 10, "");
 }
 

@@ -32,8 +32,13 @@ Textile TextileRamp::at(std::int64_t frame) const {
   if (frame <= begin) return from;
   if (frame >= end) return to;
   const double share = static_cast<double>(frame - begin) / static_cast<double>(end - begin);
-  Textile mixed{
-      {}, std::lerp(from.damping, to.damping, share), std::lerp(from.friction, to.friction, share)};
+  const auto mix_given = [&](std::optional<double> a, std::optional<double> b) {
+    return a && b ? std::lerp(*a, *b, share) : b;
+  };
+  Textile mixed{.model = {},
+                .damping = mix_given(from.damping, to.damping),
+                .friction = std::lerp(from.friction, to.friction, share),
+                .damping_ratio = mix_given(from.damping_ratio, to.damping_ratio)};
   if (const auto* measured = std::get_if<MeasuredTextile>(&from.model))
     mixed.model = mix(*measured, std::get<MeasuredTextile>(to.model), share);
   else

@@ -31,16 +31,26 @@ struct RawTextile {
   bool operator==(const RawTextile&) const = default;
 };
 
+// Of connections, kg/s: the paper's k_d.
+inline constexpr double kDefaultDamping = 2e-4;
+// Of a sheet's stiffest mode, 1 is critical: from here on connections that switch between taut and
+// slack gain no energy, at any step within the linear bound.
+inline constexpr double kSafeDampingRatio = 1e-3;
+
 struct Textile {
   std::variant<MeasuredTextile, RawTextile> model;
-  double damping = 2e-4;  // k_d, kg/s
-  double friction = 0.3;  // Coulomb coefficient
+  std::optional<double> damping = {};  // k_d, kg/s
+  double friction = 0.3;               // Coulomb coefficient
+  // Gives k_d by the damping ratio of the sheet's stiffest mode. Without either k_d is the default,
+  // or what the safe ratio asks for where that is more.
+  std::optional<double> damping_ratio = {};
 
   bool operator==(const Textile&) const = default;
 };
 
 // A textile that changes from frame to frame, linearly in every value: `from` up to frame `begin`,
-// `to` from frame `end` on. Precondition: both are measured or both are raw; begin < end.
+// `to` from frame `end` on. Damping that is given otherwise in `from` is that of `to` all the
+// while. Precondition: both are measured or both are raw; begin < end.
 struct TextileRamp {
   Textile from, to;
   std::int64_t begin = 0, end = 0;

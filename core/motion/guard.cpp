@@ -43,14 +43,21 @@ double kinetic_energy(const Mesh& mesh, const Matrix3Xd& v) {
   return twice / 2;
 }
 
-double drive_speed(const Scene& scene, const SheetDefinition& sheet, double begin, double end) {
+double motion_speed(const Scene& scene, const SheetDefinition& sheet, double begin, double end) {
   double speed = 0;
   for (const Pin& pin : sheet.pins) speed = std::max(speed, path_speed(pin.path, begin, end));
   for (const Collider& collider : scene.colliders)
     speed = std::max(speed, path_speed(collider.path, begin, end));
-  if (const auto& wind = scene.environment.wind)
-    speed = std::max(speed, wind->velocity.norm() * (1 + wind->gust));
   return speed;
+}
+
+double wind_speed(const Scene& scene) {
+  const auto& wind = scene.environment.wind;
+  return wind ? wind->velocity.norm() * (1 + wind->gust) : 0;
+}
+
+double drive_speed(const Scene& scene, const SheetDefinition& sheet, double begin, double end) {
+  return std::max(motion_speed(scene, sheet, begin, end), wind_speed(scene));
 }
 
 Verdict inspect_finite(const SheetState& after) {

@@ -26,6 +26,10 @@ struct Drive {
   double frame_step = 0;                // s
 };
 
+// The fastest that pins and colliders move between two times, m/s.
+double motion_speed(const Scene& scene, const SheetDefinition& sheet, double begin, double end);
+// The fastest that a wind blows, m/s.
+double wind_speed(const Scene& scene);
 // The fastest that anything drives a sheet between two times, m/s.
 double drive_speed(const Scene& scene, const SheetDefinition& sheet, double begin, double end);
 

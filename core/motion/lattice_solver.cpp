@@ -19,7 +19,7 @@ class LatticeSolver : public SheetSolver {
       : dynamics_(dynamics),
         columns_(sheet.grid.columns),
         particles_(sheet.particle_count()),
-        damping_(sheet.textile.damping),
+        damping_(sheet.textile.damping.value_or(kDefaultDamping)),
         law_(make_sweep_law<T>(sheet)),
         state_(law_.layout, compensated),
         gap_(static_cast<std::size_t>(law_.layout.rows)) {

@@ -25,8 +25,8 @@ class Operator {
   using Point = Eigen::Matrix<double, D, 1>;
   using Points = Eigen::Matrix<double, D, Eigen::Dynamic>;
 
-  Operator(const Mesh& mesh, const VectorXd& inverse_mass, double air_rate)
-      : mesh_(mesh), scale_(inverse_mass.cwiseSqrt()), air_rate_(air_rate) {}
+  Operator(const Mesh& mesh, const VectorXd& inverse_mass, double damping, double air_rate)
+      : mesh_(mesh), scale_(inverse_mass.cwiseSqrt()), damping_(damping), air_rate_(air_rate) {}
 
   void add(const Block& block) { blocks_.push_back(block); }
   void set_factors(double stiffness, double damping) { a_ = stiffness, b_ = damping; }
@@ -38,7 +38,7 @@ class Operator {
     Points out = Points::Zero(D, scale_.size());
     for (const Block& block : blocks_) {
       const Point difference = y.col(block.i) - y.col(block.j);
-      Point f = (a_ * block.across + b_ * mesh_.damping) * difference;
+      Point f = (a_ * block.across + b_ * damping_) * difference;
       if constexpr (D == 3)
         f += a_ * (block.along - block.across) * block.direction.dot(difference) * block.direction;
       out.col(block.i) += f;
@@ -60,7 +60,7 @@ class Operator {
  private:
   const Mesh& mesh_;
   VectorXd scale_;
-  double air_rate_;
+  double damping_, air_rate_;
   double a_ = 1, b_ = 0;
   std::vector<Block> blocks_;
 };
@@ -162,28 +162,41 @@ Block jacobian_block(const Family& family, const Connection& connection, const M
   return {i, j, direction, family.stiffness, family.stiffness * (1 - family.rest_length / length)};
 }
 
+double stiffness_of(const Family& family) {
+  return family.bend ? family.bend->largest_slope() : family.stiffness;
+}
+
+Operator<1> graph_of(const Mesh& mesh, const VectorXd& inverse_mass, double damping,
+                     double air_rate) {
+  Operator<1> graph(mesh, inverse_mass, damping, air_rate);
+  for (const Family& family : mesh.families)
+    for (const auto& [i, j] : family.connections)
+      graph.add({i, j, Vector3d::Zero(), stiffness_of(family), stiffness_of(family)});
+  return graph;
+}
+
+// Of stiffness K + damping C.
+template <int D>
+double eigenvalue(Operator<D>& matrix, double stiffness, double damping) {
+  matrix.set_factors(stiffness, damping);
+  return largest_eigenvalue(matrix);
+}
+
 }  // namespace
 
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                        double air_rate, const Matrix3Xd& x) {
-  Operator<1> graph(mesh, inverse_mass, air_rate);
-  Operator<3> jacobian(mesh, inverse_mass, air_rate);
+  Operator<1> graph = graph_of(mesh, inverse_mass, mesh.damping, air_rate);
+  Operator<3> jacobian(mesh, inverse_mass, mesh.damping, air_rate);
   double largest_stiffness = 0;
   for (const Family& family : mesh.families) {
-    const double stiffness = family.bend ? family.bend->largest_slope() : family.stiffness;
-    largest_stiffness = std::max(largest_stiffness, stiffness);
-    for (const Connection& connection : family.connections) {
-      graph.add({connection.first, connection.second, Vector3d::Zero(), stiffness, stiffness});
+    largest_stiffness = std::max(largest_stiffness, stiffness_of(family));
+    for (const Connection& connection : family.connections)
       jacobian.add(jacobian_block(family, connection, x));
-    }
   }
   // damping acts on the connections only: stencils leave modes without a lower bound
   const double ratio =
       mesh.stencils.empty() && largest_stiffness > 0 ? mesh.damping / largest_stiffness : 0;
-  const auto eigenvalue = [](auto& matrix, double stiffness, double damping) {
-    matrix.set_factors(stiffness, damping);
-    return largest_eigenvalue(matrix);
-  };
   const double omega2 = eigenvalue(graph, 1, 0);
   const double gamma = mesh.damping > 0 || air_rate > 0 ? eigenvalue(graph, 0, 1) : 0;
 
@@ -191,7 +204,28 @@ StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrato
   step.linear_bound = limit(integrator, graph, omega2, gamma, ratio);
   step.estimate = limit(integrator, jacobian, eigenvalue(jacobian, 1, 0), gamma, ratio);
   step.damping_ratio = omega2 > 0 ? gamma / (2 * std::sqrt(omega2)) : 0;
+  step.connection_ratio = step.damping_ratio;
+  if (omega2 == 0)
+    step.connection_ratio = kInfinity;
+  else if (air_rate > 0) {
+    Operator<1> connections = graph_of(mesh, inverse_mass, mesh.damping, 0);
+    step.connection_ratio = eigenvalue(connections, 0, 1) / (2 * std::sqrt(omega2));
+  }
   return step;
+}
+
+double damping_for(const Mesh& mesh, double ratio) {
+  Operator<1> graph = graph_of(mesh, mesh.mass.cwiseInverse(), 1, 0);
+  const double omega2 = eigenvalue(graph, 1, 0);
+  return omega2 > 0 ? ratio * 2 * std::sqrt(omega2) / eigenvalue(graph, 0, 1) : 0;
+}
+
+double safe_share(double connection_ratio) {
+  constexpr double kLeast = 0.45, kAtRatio = 1e-4, kMost = 0.9, kSafe = 0.9 * kSafeDampingRatio;
+  if (connection_ratio >= kSafe) return 1;
+  const double along =
+      std::log(std::max(connection_ratio, kAtRatio) / kAtRatio) / std::log(kSafe / kAtRatio);
+  return std::lerp(kLeast, kMost, along);
 }
 
 }  // namespace weft

@@ -10,6 +10,8 @@ struct StableStep {
   double linear_bound = 0;   // for every shape; 0: the integrator has none
   double estimate = 0;       // for the present shape
   double damping_ratio = 0;  // of the stiffest mode, 1 is critical
+  // The same, of what connections damp alone; infinity where nothing is stiff.
+  double connection_ratio = 0;
 };
 
 // With K and C the stiffness and damping matrices, Verlet with extrapolated damping is stable while
@@ -18,5 +20,15 @@ struct StableStep {
 // by wind, 1/s. x: (3 x n) m.
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                        double air_rate, const Matrix3Xd& x);
+
+// The k_d with which the stiffest mode of a sheet that nothing holds has a damping ratio, kg/s; 0
+// where nothing is stiff.
+double damping_for(const Mesh& mesh, double ratio);
+
+// The share of its linear bound up to which Verlet's step lets connections that switch between taut
+// and slack (eq. 2) gain no energy, 1 or less. From campaigns of random sheets, see the page of
+// `./dev bench stability`: at 0.9 of the bound growth begins below ratios of 1e-4 to 9e-4, at 0.45
+// below 1e-4.
+double safe_share(double connection_ratio);
 
 }  // namespace weft

@@ -162,6 +162,7 @@ BendingLaw Reader::bending(const v1::BendingLaw& from, const std::string& field)
 Textile Reader::textile(const v1::Textile& from, const std::string& field) {
   Textile textile;
   if (from.has_damping_kg_per_s()) textile.damping = from.damping_kg_per_s();
+  if (from.has_damping_ratio()) textile.damping_ratio = from.damping_ratio();
   if (from.has_friction_coefficient()) textile.friction = from.friction_coefficient();
   switch (from.model_case()) {
     case v1::Textile::kPreset:
@@ -289,7 +290,7 @@ LabOrder Reader::lab_order(const v1::RunTestRequest& from) {
     const Textile read = textile(from.textile(), "textile");
     // the rest is the order's own
     for (const auto& [field, message] : find_problems(read, "textile")) {
-      if (field == "textile.damping_kg_per_s" || field == "textile.friction_coefficient")
+      if (field.starts_with("textile.damping_") || field == "textile.friction_coefficient")
         problem(field, message);
     }
     if (const auto* measured = std::get_if<MeasuredTextile>(&read.model)) {

@@ -221,7 +221,8 @@ v1::Snapshot to_proto(const Session& session, const NamedSnapshot& snapshot) {
 v1::Textile to_proto(const Textile& textile) {
   v1::Textile result;
   std::visit([&](const auto& model) { set(&result, model); }, textile.model);
-  result.set_damping_kg_per_s(textile.damping);
+  if (textile.damping) result.set_damping_kg_per_s(*textile.damping);
+  if (textile.damping_ratio) result.set_damping_ratio(*textile.damping_ratio);
   result.set_friction_coefficient(textile.friction);
   return result;
 }
@@ -275,6 +276,12 @@ v1::Plan to_proto(const Plan& plan) {
     v1::StretchCost* added = result.add_stretch_costs();
     added->set_sheet(cost.sheet);
     added->set_self_weight_strain(cost.self_weight_strain);
+  }
+  for (const auto& damping : plan.dampings) {
+    v1::SheetDamping* added = result.add_dampings();
+    added->set_sheet(damping.sheet);
+    added->set_damping_kg_per_s(damping.damping);
+    added->set_damping_ratio(damping.ratio);
   }
   return result;
 }

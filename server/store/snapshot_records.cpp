@@ -32,6 +32,8 @@ Plan plan_of(const v1::Plan& from) {
         {each.sheet(), each.least_curvature_per_m(), each.finest_spacing_m()});
   for (const auto& each : from.stretch_costs())
     plan.stretch_costs.push_back({each.sheet(), each.self_weight_strain()});
+  for (const auto& each : from.dampings())
+    plan.dampings.push_back({each.sheet(), each.damping_kg_per_s(), each.damping_ratio()});
   plan.particle_substeps = from.particle_substeps_per_second();
   return plan;
 }
@@ -61,7 +63,25 @@ void set(stored::KeptSheet* to, const Snapshot::Sheet& from, const std::vector<P
     ramp->set_begin(from.ramp->begin);
     ramp->set_end(from.ramp->end);
   }
+  stored::KeptBudget* budget = to->mutable_budget();
+  budget->set_substeps(from.budget.substeps);
+  budget->set_audits(from.budget.audits);
+  budget->set_least_j(from.budget.least);
+  budget->set_most_j(from.budget.most);
+  budget->set_given_j(from.budget.given);
+  budget->set_limit_j(from.budget.limit);
+  budget->set_stored_j(from.budget.stored);
   for (const Pin& pin : pins) *to->add_pins() = to_proto(pin);
+}
+
+EnergyBudget budget_of(const stored::KeptBudget& from) {
+  return {.substeps = from.substeps(),
+          .audits = from.audits(),
+          .least = from.least_j(),
+          .most = from.most_j(),
+          .given = from.given_j(),
+          .limit = from.limit_j(),
+          .stored = from.stored_j()};
 }
 
 // Plans that a snapshot shares, each once.
@@ -180,6 +200,7 @@ SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes
       simulation.sheets.back().ramp = {textile_of(ramp.from()), textile_of(ramp.to()), ramp.begin(),
                                        ramp.end()};
     }
+    if (each.has_budget()) simulation.sheets.back().budget = budget_of(each.budget());
     auto& pins = simulation.handling.pins.emplace_back();
     for (const auto& pin : each.pins()) pins.push_back(to_pin(pin));
   }

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iostream>
 
 #include "client/scene_file.h"
 #include "server/rpc/convert.h"
@@ -29,6 +31,60 @@ double slide_from_the_top(double radius, double speed, double friction, double s
     slid += middle * dt;
   }
   return slid;
+}
+
+// Largest kinetic energy of so many seconds, J; what it was when the simulation failed, too.
+double most_energy(Simulation& simulation, double seconds) {
+  double most = 0;
+  while (simulation.time() < seconds && simulation.advance_frame())
+    most = std::max(most, simulation.stats().kinetic_energy);
+  return most;
+}
+
+bool warns(const Simulation& simulation, const std::string& code) {
+  const auto& warnings = simulation.plan().warnings;
+  return std::any_of(warnings.begin(), warnings.end(),
+                     [&](const Warning& warning) { return warning.code == code; });
+}
+
+TEST(Finds, AStiffSheetHungWithDefaultDampingStaysCalm) {
+  Simulation simulation(find("default_damping_explodes.json"));
+  EXPECT_TRUE(warns(simulation, "UNDERDAMPED"));
+  EXPECT_LT(most_energy(simulation, 6), 0.2);
+  EXPECT_TRUE(simulation.repairs().empty());
+}
+
+TEST(Finds, SheetsWithoutAnyDampingGainNoEnergyAndAreWarnedOf) {
+  for (const char* name :
+       {"hung_without_damping_gains_energy.json", "squashed_without_damping_explodes.json"}) {
+    SCOPED_TRACE(name);
+    Simulation simulation(find(name));
+    EXPECT_TRUE(warns(simulation, "UNDERDAMPED"));
+    const FrameStats start = simulation.stats();
+    const double stored = start.kinetic_energy + start.potential_energy;
+    double most = stored;
+    while (simulation.time() < 5) {
+      ASSERT_TRUE(simulation.advance_frame());
+      const FrameStats stats = simulation.stats();
+      most = std::max(most, stats.kinetic_energy + stats.potential_energy);
+    }
+    EXPECT_TRUE(simulation.repairs().empty());
+    std::cout << name << " " << stored << " -> " << most << "\n";
+  }
+}
+
+TEST(Finds, AStepThatIsAskedForAgainstTheWarningIsHalvedOnceEnergyComesFromNothing) {
+  Scene scene = find("default_damping_explodes.json");
+  scene.sheets[0].textile.damping = 2e-4;
+  scene.solver.substep = 0.9 * Simulation(scene).plan().step.linear_bound;
+  Simulation simulation(scene);
+  EXPECT_TRUE(warns(simulation, "UNDERDAMPED"));
+  const double most = most_energy(simulation, 10);
+  EXPECT_FALSE(simulation.repairs().empty());
+  for (const Repair& r : simulation.repairs())
+    std::cout << r.frame << " " << r.substep << " " << r.reason << "\n";
+  std::cout << most << " " << simulation.stats().kinetic_energy << "\n";
+  EXPECT_LT(simulation.stats().kinetic_energy, 0.2);
 }
 
 TEST(Finds, FrictionOnABallTakesWhatTheNormalForceOfACurvedPathAllows) {

@@ -145,12 +145,65 @@ bool warns(const Scene& scene, const std::string& code) {
 
 TEST(Simulation, APlanWarnsOfWhatTheModelLeavesOut) {
   Scene scene = hanging();
+  scene.sheets[0].textile.damping_ratio = 0.01;
   EXPECT_EQ(warnings(scene), std::vector<std::string>{"NO_SELF_COLLISION"});
   scene.sheets.push_back(scene.sheets[0]);
   scene.sheets[1].name = "other";
   scene.colliders = {{"table", Box{Vector3d::Zero(), Vector3d(1, 1, 1)}, 0.3, {}}};
   EXPECT_TRUE(warns(scene, "NO_SHEET_SHEET_COLLISION"));
   EXPECT_TRUE(warns(scene, "BOX_EDGES"));
+}
+
+TEST(Simulation, AStiffSheetWithoutADampingGetsTheSafeRatioAndAWarning) {
+  Scene scene = hanging();
+  scene.sheets[0].textile.damping = {};
+  auto& textile = std::get<RawTextile>(scene.sheets[0].textile.model);
+  textile.stretch = textile.shear = 2;
+  EXPECT_FALSE(warns(scene, "UNDERDAMPED"));
+  EXPECT_EQ(Simulation(scene).plan().dampings[0].damping, kDefaultDamping);
+
+  textile.stretch = 23000;
+  EXPECT_TRUE(warns(scene, "UNDERDAMPED"));
+  const Plan plan = Simulation(scene).plan();
+  EXPECT_GT(plan.dampings[0].damping, kDefaultDamping);
+  EXPECT_NEAR(plan.dampings[0].ratio, kSafeDampingRatio, 0.1 * kSafeDampingRatio);
+  EXPECT_GT(1.15 * plan.step.substep, scene.solver.safety * plan.step.linear_bound);
+}
+
+TEST(Simulation, ADampingGivenTooLowShortensTheStepAndAnAskedStepIsWarnedOf) {
+  Scene scene = hanging();
+  std::get<RawTextile>(scene.sheets[0].textile.model).stretch = 23000;
+  scene.sheets[0].textile.damping_ratio = 0.01;
+  const double damped = Simulation(scene).plan().step.substep;
+  EXPECT_FALSE(warns(scene, "UNDERDAMPED"));
+
+  scene.sheets[0].textile.damping_ratio = {};
+  scene.sheets[0].textile.damping = 0;
+  EXPECT_TRUE(warns(scene, "UNDERDAMPED"));
+  EXPECT_NEAR(Simulation(scene).plan().step.substep, damped / 2, 0.05 * damped);
+
+  scene.solver.substep = damped;
+  EXPECT_TRUE(warns(scene, "UNDERDAMPED"));
+  EXPECT_EQ(Simulation(scene).plan().step.substep, damped);
+  scene.solver.substep = damped / 3;
+  EXPECT_FALSE(warns(scene, "UNDERDAMPED"));
+}
+
+// Four particles on four springs: in the stiffest mode w^2 = 4 k / m, damped by 4 k_d / m = 2 ratio
+// w.
+TEST(Simulation, ADampingRatioIsThatOfTheStiffestMode) {
+  Scene scene = hanging(0);
+  SheetDefinition& sheet = scene.sheets[0];
+  sheet.grid = {.rows = 2, .columns = 2, .spacing = 0.05};
+  sheet.pins.clear();
+  auto& textile = std::get<RawTextile>(sheet.textile.model);
+  textile.shear = 0;
+  sheet.textile.damping_ratio = 0.2;
+  const double m = textile.particle_mass, k = textile.stretch;
+  const double expected = 2 * 0.2 * std::sqrt(4 * k / m) * m / 4;
+  const Simulation simulation(scene);
+  EXPECT_NEAR(simulation.plan().dampings[0].ratio, 0.2, 0.002);
+  EXPECT_NEAR(simulation.plan().dampings[0].damping, expected, 0.01 * expected);
 }
 
 // The top connection carries 11 particles: 11 m g = k h 5 % is what the stiffness is capped to.

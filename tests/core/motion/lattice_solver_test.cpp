@@ -101,7 +101,7 @@ const Feature kFeatures[] = {
     {"NoStretch", [](SheetDefinition& s) { raw(s).stretch = 0, raw(s).clamp = 100; }},
     {"NoBend", [](SheetDefinition& s) { raw(s).bend = 0; }},
     {"NoBendNoShearNoDamping",
-     [](SheetDefinition& s) { raw(s).bend = raw(s).shear = s.textile.damping = 0; }},
+     [](SheetDefinition& s) { s.textile.damping = raw(s).bend = raw(s).shear = 0; }},
     {"NoDiagonalBend", [](SheetDefinition& s) { s.bending = ChoiKo{.diagonal_bend = false}; }},
     {"NoDiagonalBendNoShear",
      [](SheetDefinition& s) { raw(s).shear = 0, s.bending = ChoiKo{.diagonal_bend = false}; }},
@@ -188,7 +188,7 @@ template <class T>
 std::vector<T> swept(const SheetDefinition& sheet, bool poisoned, int bands = 1) {
   using State = SweepState<T>;
   SweepLaw<T> law = make_sweep_law<T>(sheet);
-  law.damping = static_cast<T>(sheet.textile.damping / (2 * 1e-4));
+  law.damping = static_cast<T>(*sheet.textile.damping / (2 * 1e-4));
   law.drift = {0, T(-1e-7), 0};
   law.wind = {true, {T(2), T(-1), T(4)}, T(1 / 6e-4), T(0.1), T(0.01)};
   State state(law.layout, law.compensated);

@@ -31,6 +31,7 @@ std::string audit(const Mesh& mesh, const Drive& drive, double height, double wi
   const double energy = stored - mesh.mass.dot(state.x.transpose() * drive.gravity);
   budget.substeps = 0;
   budget.stored = std::max(budget.stored, stored);
+  if (std::isinf(budget.limit)) budget.limit = energy + stored;
   budget.least = budget.audits == 0 ? energy : std::min(budget.least, energy);
   budget.most = budget.audits == 0 ? energy : std::max(budget.most, energy);
   if (++budget.audits < kAudits) return {};

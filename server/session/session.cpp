@@ -201,7 +201,7 @@ bool Session::settle_writing() {
       error = *std::exchange(writing_.written, std::nullopt);
     }
     then(error);  // which may write again
-    if (snapshot_due()) offer_snapshot();
+    if (log_grew()) offer_snapshot();
   }
 }
 
@@ -631,7 +631,7 @@ void Session::compute_frame(Clock::time_point due) {
   }
   offer_to_all();
   work_ += Clock::now() - begin;
-  if (snapshot_due()) offer_snapshot();
+  if (snapshot_due() || log_grew()) offer_snapshot();
 }
 
 void Session::count_frame(std::chrono::duration<double> time) {

@@ -209,6 +209,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   void let_go_of_streams();
   void compute_frame(Clock::time_point due);
   bool snapshot_due() const;
+  bool log_grew() const;
   void offer_snapshot();
   std::shared_ptr<const SessionSnapshot> snapshot() const;
   bool begin_at(const SessionSnapshot& from, const SessionPast& past);

@@ -12,12 +12,17 @@
 namespace weft {
 
 // Whether there was enough to compute since the last snapshot, which large sessions have written
-// more rarely, or so many calls that the log should not grow without one.
+// more rarely.
 bool Session::snapshot_due() const {
   constexpr double kParticles = 20'000;
+  return work_ > snapshot_after_ * std::max(1.0, simulation_.particle_count() / kParticles);
+}
+
+// Whether there were so many calls since the last snapshot that the log should not grow without
+// one.
+bool Session::log_grew() const {
   constexpr std::int64_t kManyEntries = 500;
-  return work_ > snapshot_after_ * std::max(1.0, simulation_.particle_count() / kParticles) ||
-         entries_ - entries_in_snapshot_ >= kManyEntries;
+  return entries_ - entries_in_snapshot_ >= kManyEntries;
 }
 
 void Session::offer_snapshot() {

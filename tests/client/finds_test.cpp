@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iostream>
 
 #include "client/scene_file.h"
+#include "core/model/mesh.h"
 #include "server/rpc/convert.h"
 #include "tests/support/core/scenes.h"
 
@@ -54,22 +54,26 @@ TEST(Finds, AStiffSheetHungWithDefaultDampingStaysCalm) {
   EXPECT_TRUE(simulation.repairs().empty());
 }
 
-TEST(Finds, SheetsWithoutAnyDampingGainNoEnergyAndAreWarnedOf) {
+// What falls is m g h; reading fast modes by their extrapolated velocities adds some per cent.
+TEST(Finds, SheetsWithoutAnyDampingGainLittleEnergyAndAreWarnedOf) {
   for (const char* name :
        {"hung_without_damping_gains_energy.json", "squashed_without_damping_explodes.json"}) {
     SCOPED_TRACE(name);
-    Simulation simulation(find(name));
+    const Scene scene = find(name);
+    Simulation simulation(scene);
     EXPECT_TRUE(warns(simulation, "UNDERDAMPED"));
+    const SheetDefinition& sheet = scene.sheets[0];
+    const double fall = make_lattice(sheet).mass.sum() * scene.environment.gravity.norm() *
+                        (sheet.grid.rows - 1) * sheet.grid.spacing;
     const FrameStats start = simulation.stats();
     const double stored = start.kinetic_energy + start.potential_energy;
-    double most = stored;
     while (simulation.time() < 5) {
       ASSERT_TRUE(simulation.advance_frame());
       const FrameStats stats = simulation.stats();
-      most = std::max(most, stats.kinetic_energy + stats.potential_energy);
+      ASSERT_LT(stats.kinetic_energy + stats.potential_energy,
+                stored + 0.1 * std::max(fall, stored))
+          << simulation.time();
     }
-    EXPECT_TRUE(simulation.repairs().empty());
-    std::cout << name << " " << stored << " -> " << most << "\n";
   }
 }
 
@@ -79,12 +83,9 @@ TEST(Finds, AStepThatIsAskedForAgainstTheWarningIsHalvedOnceEnergyComesFromNothi
   scene.solver.substep = 0.9 * Simulation(scene).plan().step.linear_bound;
   Simulation simulation(scene);
   EXPECT_TRUE(warns(simulation, "UNDERDAMPED"));
-  const double most = most_energy(simulation, 10);
-  EXPECT_FALSE(simulation.repairs().empty());
-  for (const Repair& r : simulation.repairs())
-    std::cout << r.frame << " " << r.substep << " " << r.reason << "\n";
-  std::cout << most << " " << simulation.stats().kinetic_energy << "\n";
-  EXPECT_LT(simulation.stats().kinetic_energy, 0.2);
+  EXPECT_LT(most_energy(simulation, 10), 60);  // 6200 J without
+  ASSERT_FALSE(simulation.repairs().empty());
+  EXPECT_NE(simulation.repairs()[0].reason.find("energy rose"), std::string::npos);
 }
 
 TEST(Finds, FrictionOnABallTakesWhatTheNormalForceOfACurvedPathAllows) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace weft {
 namespace {
@@ -17,6 +18,14 @@ Distance distance_at(const Collider& collider, const Vector3d& offset, const Vec
   return std::visit([&](const auto& shape) { return distance(shape, point - offset); },
                     collider.shape);
 }
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+// Where a body is thinnest, m.
+double thickness(const Plane&) { return kInfinite; }
+double thickness(const Sphere& sphere) { return 2 * sphere.radius; }
+double thickness(const Box& box) { return 2 * box.half_size.minCoeff(); }
+double thickness(const Capsule& capsule) { return 2 * capsule.radius; }
 
 }  // namespace
 
@@ -56,31 +65,71 @@ Distance distance(const Collider& collider, const Vector3d& point, double time) 
 
 Contacts::Contacts(std::span<const Collider> colliders, double friction, double skin, double time,
                    double dt)
-    : skin_(skin) {
+    : skin_(skin), thinnest_(kInfinite) {
   placed_.reserve(colliders.size());
   for (const Collider& collider : colliders) {
     const Vector3d offset = offset_at(collider.path, time);
     const Vector3d carried = offset - offset_at(collider.path, time - dt);
     const auto* box = std::get_if<Box>(&collider.shape);
-    placed_.push_back({collider,
-                       box != nullptr ? box->rotation.normalized().toRotationMatrix()
-                                      : Eigen::Matrix3d::Identity().eval(),
-                       offset, carried, std::sqrt(friction * collider.friction)});
+    placed_.push_back(
+        {collider,
+         box != nullptr ? box->rotation.normalized().toRotationMatrix()
+                        : Eigen::Matrix3d::Identity().eval(),
+         offset, carried, std::sqrt(friction * collider.friction),
+         std::visit([](const auto& shape) { return thickness(shape); }, collider.shape) +
+             2 * skin});
     reach_ = std::max(reach_, carried.norm());
+    thinnest_ = std::min(thinnest_, placed_.back().thickness);
   }
 }
 
+double Contacts::gap(const Vector3d& x) const {
+  double least = kInfinite;
+  for (const Placed& each : placed_)
+    least = std::min(least, distance_at(each.collider, each.offset, x).value - skin_);
+  return least;
+}
+
+// Of the step, for a particle that could have met a collider in it.
+int Contacts::parts(const Vector3d& x, const Vector3d& d) const {
+  constexpr double kMost = 1e4;
+  double most = 1;
+  for (const Placed& each : placed_) {
+    const double relative = (d - each.carried).norm();
+    const double needed = kParts * relative / each.thickness;
+    if (needed > most && distance_at(each.collider, each.offset, x).value - skin_ < relative)
+      most = needed;
+  }
+  return static_cast<int>(std::ceil(std::min(most, kMost)));
+}
+
 bool Contacts::resolve(Vector3d& x, Vector3d& d) const {
+  const int count = parts(x, d);
+  if (count == 1) return push_out(x, d, 0, 1);
+  Vector3d at = x - d, part = d / count;
+  bool touched = false;
+  for (int left = count - 1; left >= 0; --left) {
+    at += part;
+    touched |= push_out(at, part, double(left) / count, 1.0 / count);
+  }
+  if (!touched) return false;
+  x = at;
+  d = count * part;
+  return true;
+}
+
+bool Contacts::push_out(Vector3d& x, Vector3d& d, double left, double share) const {
   bool touched = false;
   for (int round = 0; round < kRounds; ++round) {
     double deepest = 0;
-    for (const auto& [collider, turn, offset, carried, mu] : placed_) {
-      const auto [value, normal] = distance_at(collider, offset, x);
+    for (const Placed& each : placed_) {
+      const Vector3d offset = each.offset - left * each.carried;
+      const auto [value, normal] = distance_at(each.collider, offset, x);
       if (!(value < skin_)) continue;
       touched = true;
       const double depth = skin_ - value;
       deepest = std::max(deepest, depth);
-      const Vector3d relative = d - carried;
+      const Vector3d relative = d - share * each.carried;
       const double approach = relative.dot(normal);
 
       // out to the skin; the push takes away approach but never adds speed
@@ -93,7 +142,7 @@ bool Contacts::resolve(Vector3d& x, Vector3d& d) const {
       const Vector3d sliding = relative - approach * normal;
       const double length = sliding.norm();
       if (length == 0) continue;
-      const Vector3d stopped = std::min(1.0, mu * push / length) * sliding;
+      const Vector3d stopped = std::min(1.0, each.friction * push / length) * sliding;
       x -= stopped;
       d -= stopped;
     }

@@ -34,6 +34,7 @@ class Contacts {
     Vector3d offset;       // from its start, m
     Vector3d carried;      // its displacement in the step, m
     double friction;       // between it and the textile
+    double thickness;      // of it where it is thinnest, with the skin on both sides, m
   };
   std::span<const Placed> placed() const { return placed_; }
   double skin() const { return skin_; }
@@ -43,14 +44,25 @@ class Contacts {
   static constexpr double kNothing = 1e-12;
   // How far the fastest collider moves in this step, m.
   double reach() const { return reach_; }
+  // Whether a particle that moves so far (m) in this step could come through a collider unseen.
+  bool may_cross(double moved) const { return kParts * (moved + reach_) > thinnest_; }
+  // How far a point is from the nearest skin at the end of the step, m; negative inside.
+  double gap(const Vector3d& x) const;
   // Moves a particle that is closer to a collider than the skin out to it, inelastically, and slows
-  // its sliding by Coulomb friction. x: position, d: displacement of the last step, m. Whether it
-  // touched one.
+  // its sliding by Coulomb friction. Where it could have crossed one in the step, it meets them in
+  // parts of the step, in each of which it comes no farther than a quarter of the thickness. x:
+  // position, d: displacement of the last step, m. Whether it touched one.
   bool resolve(Vector3d& x, Vector3d& d) const;
 
  private:
+  static constexpr double kParts = 4;  // of a thickness
+
+  int parts(const Vector3d& x, const Vector3d& d) const;
+  // In part `share` of the step that ends `left` of the step before its end.
+  bool push_out(Vector3d& x, Vector3d& d, double left, double share) const;
+
   std::vector<Placed> placed_;
-  double skin_, reach_ = 0;
+  double skin_, reach_ = 0, thinnest_;
 };
 
 }  // namespace weft

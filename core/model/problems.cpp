@@ -66,6 +66,19 @@ class Check {
     }
   }
 
+  // Of a collider whose path is sound.
+  void speed(const std::string& field, const Path& path) {
+    constexpr double kRounding = 1e-9;
+    for (std::size_t k = 1; k < path.size(); ++k) {
+      const double way = (path[k].offset - path[k - 1].offset).norm();
+      const double time = path[k].time - path[k - 1].time;
+      if (time > 0 && way > (1 + kRounding) * kMostColliderSpeed * time)
+        problem(at(field, k) + ".offset_m", "moves " + text(way) + " m in " + text(time) + " s, " +
+                                                text(way / time) + " m/s; colliders move at most " +
+                                                text(kMostColliderSpeed) + " m/s");
+    }
+  }
+
   // Names identify sheets and colliders.
   void name(const std::string& field, const std::string& name, std::set<std::string>& taken) {
     bool good = !name.empty() && name.size() <= 63;
@@ -240,6 +253,7 @@ std::vector<Problem> find_problems(const Scene& scene) {
     std::visit([&](const auto& shape) { check_shape(shape, field, check); }, collider.shape);
     check.number(field + ".friction_coefficient", collider.friction, 0, 10, "");
     check.path(field + ".path", collider.path);
+    check.speed(field + ".path", collider.path);
   }
   check_environment(scene.environment, check);
   check_solver(scene.solver, check);

@@ -16,6 +16,8 @@ using Eigen::Vector3d;
 
 // Of a keyframe along each axis, m.
 inline constexpr double kMostOffset = 1e4;
+// At which contact follows colliders, m/s.
+inline constexpr double kMostColliderSpeed = 100;
 
 struct Keyframe {
   double time = 0;                     // s

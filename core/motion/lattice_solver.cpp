@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -87,13 +88,15 @@ class LatticeSolver : public SheetSolver {
       if ((gap_[static_cast<std::size_t>(r)] -= come_) <= 0) near_.push_back(r);
     come_ = 0;
 
+    const bool in_parts = contacts.may_cross(moved_);
     const int count = static_cast<int>(near_.size());
     const int parts = std::clamp(count, 1, bands(crew));
     const auto resolve_part = [&](int part) {
       for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
         const int r = near_[static_cast<std::size_t>(i)];
         gap_[static_cast<std::size_t>(r)] =
-            resolve_row(contacts, origin_, law_.compensated, r, state_);
+            in_parts ? resolve_in_parts(contacts, r)
+                     : resolve_row(contacts, origin_, law_.compensated, r, state_);
       }
     };
     if (parts == 1)
@@ -189,7 +192,8 @@ class LatticeSolver : public SheetSolver {
       for (int c = 0; c < columns_; ++c, ++i) f(i, state.place(r, c));
   }
 
-  double exact(int plane, int error, ConstPlace at) const {
+  template <class P>
+  double exact(int plane, int error, P at) const {
     return law_.compensated ? at[plane] - double{at[error]} : at[plane];
   }
   void set(int plane, int error, Place at, const Vector3d& exact) {
@@ -202,6 +206,29 @@ class LatticeSolver : public SheetSolver {
     set(State::kX, State::kXError, at, x - origin_);
   }
   void set_displacement(Place at, const Vector3d& d) { set(State::kD, State::kDError, at, d); }
+
+  // As resolve_row(), where particles may come through colliders unseen.
+  double resolve_in_parts(const Contacts& contacts, int row) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int c = 0; c < columns_; ++c) {
+      const Place at = state_.place(row, c);
+      if (at[State::kStep2] == 0) continue;
+      Vector3d x, d;
+      for (int axis = 0; axis < 3; ++axis) {
+        x[axis] = origin_[axis] + exact(State::kX + axis, State::kXError + axis, at);
+        d[axis] = exact(State::kD + axis, State::kDError + axis, at);
+      }
+      const Vector3d before = d;
+      if (contacts.resolve(x, d)) {
+        set_position(at, x);
+        set_displacement(at, d);
+        for (int axis = 0; axis < 3; ++axis)
+          at[State::kW + axis] += static_cast<T>(3 * (d[axis] - before[axis]));
+      }
+      nearest = std::min(nearest, contacts.gap(x));
+    }
+    return nearest;
+  }
 
   // Drag over mass is one for all particles: both go by area, 1/s.
   double drag_rate() const {

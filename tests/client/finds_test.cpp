@@ -88,6 +88,50 @@ TEST(Finds, AStepThatIsAskedForAgainstTheWarningIsHalvedOnceEnergyComesFromNothi
   EXPECT_NE(simulation.repairs()[0].reason.find("energy rose"), std::string::npos);
 }
 
+// Of the particles that the middle of the board met, with its front at z = `front`, m: those that
+// it has come through.
+int behind(const Scene& scene, const Simulation& simulation, double front) {
+  const auto& board = std::get<Box>(scene.colliders[0].shape);
+  const Matrix3Xd start = start_positions(scene.sheets[0]), now = positions(simulation);
+  int met = 0, count = 0;
+  for (Eigen::Index i = 0; i < start.cols(); ++i) {
+    const Vector3d from = (start.col(i) - board.center).cwiseAbs();
+    if (from.x() > 0.8 * board.half_size.x() || from.y() > 0.8 * board.half_size.y()) continue;
+    ++met;
+    count += now(2, i) < front;
+  }
+  EXPECT_GT(met, 150);
+  return count;
+}
+
+TEST(Finds, ABoardThatIsMovedAsFastAsAllowedCarriesTheClothAlong) {
+  for (const bool plain : {true, false}) {
+    Scene scene = find("swept_board.json");
+    scene.solver.plain = plain;
+    Simulation simulation(scene);
+    Action move;
+    move.kind = Action::Kind::kMoveCollider;
+    move.name = "board";
+    move.target = {0, 0, 0.6};
+    move.duration = 0.03;
+    ASSERT_FALSE(simulation.act({move}));
+    for (int frame = 0; frame < 3; ++frame) ASSERT_TRUE(simulation.advance_frame());
+    EXPECT_GE(positions(simulation)(2, 15 * 31 + 15), 0.28);
+    EXPECT_EQ(behind(scene, simulation, 0.31), 0);
+  }
+}
+
+TEST(Finds, ABoardAt100MetresPerSecondDoesNotComeThroughTheCloth) {
+  for (const bool plain : {true, false}) {
+    Scene scene = find("board_at_100_m_per_s_passes_through.json");
+    scene.solver.plain = plain;
+    scene.solver.frame_step = 0.006;  // it arrives; later the cloth slides off it
+    Simulation simulation(scene);
+    ASSERT_TRUE(simulation.advance_frame());
+    EXPECT_EQ(behind(scene, simulation, 0.31), 0);
+  }
+}
+
 TEST(Finds, FrictionOnABallTakesWhatTheNormalForceOfACurvedPathAllows) {
   for (const bool plain : {true, false}) {
     Scene scene = find("friction_on_a_ball.json");

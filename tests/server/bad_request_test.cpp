@@ -87,6 +87,7 @@ v1::Scene full_scene() {
   textile->set_bend_rigidity_weft_n_m(2e-5);
   textile->set_air_drag_kg_per_m2_s(0.1);
   measured->mutable_bending()->mutable_isometric()->set_resist_compression(false);
+  measured->mutable_textile()->set_damping_ratio(1e-3);
   v1::Sheet* preset = scene.add_sheets();
   *preset->mutable_grid() = sheet->grid();
   preset->mutable_textile()->set_preset("denim_11oz");

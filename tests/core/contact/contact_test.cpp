@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
 
 #include "core/motion/lattice_contact.h"
 #include "core/motion/lattice_law.h"
@@ -76,6 +77,44 @@ TEST(Contact, NoFreeParticleEndsAStepInsideACollider) {
       }
     }
     EXPECT_GT(touching, 0) << "shape " << collider.shape.index();
+  }
+}
+
+// Boards, balls and capsules from 1 mm, up to 100 m/s, at steps of up to 10 ms.
+TEST(Contact, NoBodyAndNoParticleCrossesTheOtherHoweverFastAndThin) {
+  std::mt19937 random(23);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const auto power = [&](double low, double high) {
+    return low * std::pow(high / low, uniform(random));
+  };
+  const auto direction = [&] {
+    return Vector3d(uniform(random) - 0.5, uniform(random) - 0.5, uniform(random) - 0.5)
+        .normalized();
+  };
+  const double skin = 1e-3;
+  for (int i = 0; i < 20'000; ++i) {
+    SCOPED_TRACE(i);
+    const Vector3d way = direction(), side = way.cross(direction()).normalized();
+    const double half = power(5e-4, 0.1), dt = power(1e-6, 1e-2);
+    Collider collider = body(Sphere{Vector3d::Zero(), half}, uniform(random));
+    if (i % 3 == 1) collider.shape = Capsule{-0.3 * side, 0.3 * side, half};
+    if (i % 3 == 2) {
+      const Quaterniond turn = Quaterniond::FromTwoVectors(Vector3d::UnitZ(), way);
+      collider.shape = Box{Vector3d::Zero(), Vector3d(2, 2, half), turn};
+    }
+    // the particle comes along `way` as the collider sees it, and meets its middle
+    const double speed = power(0.1, 100), own = uniform(random) * speed;
+    collider.path = {{0, Vector3d::Zero()}, {dt, -(speed - own) * dt * way}};
+    const double start = -(half + skin) - uniform(random) * speed * dt;
+    Vector3d d = own * dt * way, x = start * way + d;
+    const Contacts contacts(std::span(&collider, 1), 0.3, skin, dt, dt);
+    const Vector3d before = x;
+    const bool touched = contacts.resolve(x, d);
+    const Vector3d seen = x - collider.path[1].offset;
+    EXPECT_LT(seen.dot(way), 0);
+    EXPECT_GT(distance(collider, x, dt).value, skin - 1e-9);
+    EXPECT_TRUE(touched || x == before);
+    EXPECT_LE((d - (collider.path[1].offset)).norm(), speed * dt * (1 + 1e-9));
   }
 }
 
@@ -165,6 +204,32 @@ void expect_rows_like_particles(const std::vector<Collider>& colliders) {
     EXPECT_NEAR(gap, nearest, 1e-14) << row;
   }
   EXPECT_GT(touched, 10);
+}
+
+// A sheet that floats, in the way of a board that is larger than it.
+TEST(Contact, ABoardOfAnyThicknessAndSpeedPushesASheetAlong) {
+  for (const double thickness : {1e-3, 0.02}) {
+    for (const double speed : {5.0, 30.0, 100.0}) {
+      for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
+        for (const bool plain : {false, true}) {
+          SCOPED_TRACE(::testing::Message() << thickness << " m, " << speed << " m/s, " << plain);
+          Scene scene = floating(flat_sheet(13, 13));
+          scene.colliders = {body(Box{Vector3d(0, -0.1, 0), Vector3d(2, thickness / 2, 2)})};
+          scene.colliders[0].path = {{0, Vector3d::Zero()}, {0.5 / speed, Vector3d(0, 0.5, 0)}};
+          scene.solver.precision = precision;
+          scene.solver.plain = plain;
+          scene.solver.frame_step = 0.25 / speed;
+          Simulation simulation(scene);
+          for (int frame = 0; frame < 3; ++frame) {
+            ASSERT_TRUE(simulation.advance_frame());
+            const double front =
+                -0.1 + offset_at(scene.colliders[0].path, simulation.time()).y() + thickness / 2;
+            EXPECT_GT(positions(simulation).row(1).minCoeff(), front);
+          }
+        }
+      }
+    }
+  }
 }
 
 TEST(Contact, OfARowInVectorsIsThatOfItsParticles) {

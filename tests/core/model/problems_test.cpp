@@ -73,6 +73,18 @@ TEST(Problems, KeyframesFollowEachOther) {
   EXPECT_THAT(bad_fields(scene), ElementsAre("sheets[0].pins[0].path[1].time_s"));
 }
 
+TEST(Problems, CollidersMoveNoFasterThanContactFollows) {
+  Scene scene = good();
+  scene.colliders = {{"ball", Sphere{Vector3d::Zero(), 0.1}, 0.3, {}}};
+  scene.colliders[0].path = {{0, Vector3d::Zero()}, {0.01, Vector3d(0, 1, 0)}};
+  EXPECT_THAT(bad_fields(scene), IsEmpty());
+  scene.colliders[0].path.push_back({0.02, Vector3d(0, 2.5, 0)});
+  const auto problems = find_problems(scene);
+  ASSERT_EQ(problems.size(), 1u);
+  EXPECT_EQ(problems[0].field, "colliders[0].path[2].offset_m");
+  EXPECT_EQ(problems[0].message, "moves 1.5 m in 0.01 s, 150 m/s; colliders move at most 100 m/s");
+}
+
 TEST(Problems, NamesAreUniqueAndWellFormed) {
   Scene scene = good();
   scene.sheets.push_back(scene.sheets[0]);

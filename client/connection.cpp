@@ -151,6 +151,8 @@ class Connection::Embedded {
   static ServerOptions without_address() {
     ServerOptions options;
     options.host.reset();
+    // nobody else waits for it
+    options.limits.max_frame_work = std::numeric_limits<std::int64_t>::max();
     return options;
   }
 

@@ -299,11 +299,11 @@ void warn(const Scene& scene, const std::vector<SheetShape>& shapes,
 
 }  // namespace
 
-std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver) {
-  if (step.substep > step.linear_bound && !solver.allow_unstable)
-    return StepRefusal{step.substep, step.linear_bound, false};
-  if (step.substeps > kMaxSubsteps) return StepRefusal{step.substep, step.linear_bound, true};
-  return std::nullopt;
+std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver,
+                                        std::int64_t most_substeps) {
+  const bool unstable = step.substep > step.linear_bound && !solver.allow_unstable;
+  if (!unstable && step.substeps <= most_substeps) return std::nullopt;
+  return StepRefusal{step.substep, step.linear_bound, !unstable, step.substeps, most_substeps};
 }
 
 Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes) {

@@ -70,8 +70,11 @@ struct StepRefusal {
   double asked = 0;                // s
   double bound = 0;                // s
   bool too_many_substeps = false;  // else: asked lies above the linear bound
+  std::int64_t substeps = 0;       // of a frame
+  std::int64_t most_substeps = kMaxSubsteps;
 };
-std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver);
+std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver,
+                                        std::int64_t most_substeps = kMaxSubsteps);
 
 // A sheet's present shape, as a plan sees it.
 struct SheetShape {

@@ -145,9 +145,19 @@ std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefiniti
   return make_lattice_solver(sheet, dynamics, scene.environment.wind, scene.solver);
 }
 
+// A frame that is being computed.
+struct UnfinishedFrame {
+  std::int64_t substeps = 0;        // taken by this attempt
+  std::optional<Attempt> doubtful;  // the attempt before it, with twice the step
+  std::size_t repairs = 0;          // before the frame
+  int halvings = 0;                 // before the frame
+  std::optional<Snapshot> before;   // where it can be dropped
+};
+
 struct Simulation::State {
   Scene scene;
   SolverFactory make_solver;
+  std::int64_t most_substeps = kMaxSubsteps;
   Plan plan;
   std::vector<Sheet> sheets;
   std::vector<Grab> grabs;  // their pins are among the scene's
@@ -159,6 +169,7 @@ struct Simulation::State {
   bool textile_changed = false;
   std::vector<Repair> repairs;
   std::string failure;
+  std::optional<UnfinishedFrame> unfinished;
 
   State(Scene given, SolverFactory factory);
   SheetDefinition capped(std::size_t sheet) const;
@@ -169,12 +180,19 @@ struct Simulation::State {
   bool change_textiles();
   void bind_forces();
   void step(double time, double dt, Crew& crew);
-  bool compute_frame(Crew& crew, NextStates& next);
-  Attempt attempt(Crew& crew, NextStates& next);
+  bool begin_frame(bool in_parts);
+  FramePart compute_frame(const Enough& enough, Crew& crew, NextStates& next);
+  bool take_substeps(const Enough& enough, Crew& crew);
+  Attempt look_at(NextStates& next);
+  bool halve(const char* what, const std::string& reason);
   bool keep_to_budget(NextStates& next);
   void go_on_from(NextStates& next);
   bool quiet(const NextStates& next) const;
   void set_halvings(int count);
+  int particle_count() const;
+  std::optional<StepRefusal> refusal_of(const StepPlan& step) const;
+  Snapshot snapshot() const;
+  void go_back_to(const Snapshot& before);
   Handling handling() const;
   Moment moment() const;
   void adopt(Handling handling);
@@ -349,7 +367,7 @@ std::optional<StepRefusal> Simulation::State::set_textile(std::size_t sheet,
   const Textile old = scene.sheets[sheet].textile;
   put_textile(sheet, textile);
   Plan made = plan_now();
-  if (const auto refused = find_refusal(made.step, scene.solver)) {
+  if (const auto refused = refusal_of(made.step)) {
     put_textile(sheet, old);
     return refused;
   }
@@ -370,8 +388,13 @@ bool Simulation::State::change_textiles() {
     if (const auto refused = set_textile(s, ramp->at(frame + 1))) {  // since particles were let go
       std::ostringstream why;
       why << "frame " << frame + 1 << " cannot be computed: as the textile of "
-          << scene.sheets[s].name << " changes, a substep of " << refused->asked
-          << " s lies above its linear bound of " << refused->bound << " s";
+          << scene.sheets[s].name << " changes, ";
+      if (refused->too_many_substeps)
+        why << "it needs " << refused->substeps << " substeps; at most " << refused->most_substeps
+            << " are computed";
+      else
+        why << "a substep of " << refused->asked << " s lies above its linear bound of "
+            << refused->bound << " s";
       failure = why.str();
       return false;
     }
@@ -405,12 +428,34 @@ bool Simulation::State::quiet(const NextStates& next) const {
   return true;
 }
 
-// Computes the next frame from the state that the solvers are in, and has it looked at.
-Attempt Simulation::State::attempt(Crew& crew, NextStates& next) {
-  const double begin = time();
-  for (std::int64_t k = 0; k < plan.step.substeps; ++k)
-    step(begin + static_cast<double>(k) * plan.step.substep, plan.step.substep, crew);
+// False: the frame cannot be computed.
+bool Simulation::State::begin_frame(bool in_parts) {
+  // saving costs as much as up to 17 substeps of a lattice in single precision
+  constexpr std::int64_t kWorthSaving = 1000;
+  std::optional<Snapshot> before;
+  if (in_parts && plan.step.substeps >= kWorthSaving) before = snapshot();
+  if (!change_textiles()) return false;
+  for (const Sheet& sheet : sheets) sheet.good();  // to go back to, and to show
+  unfinished = {0, {}, repairs.size(), halvings, std::move(before)};
+  return true;
+}
 
+// Takes those that the attempt has left; false: some still are, and it is enough.
+bool Simulation::State::take_substeps(const Enough& enough, Crew& crew) {
+  constexpr int kParticles = 4096;  // whose substep takes longer than to ask
+  const std::int64_t turn = std::max(1, kParticles / particle_count());
+  const double begin = time(), dt = plan.step.substep;
+  for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
+    step(begin + static_cast<double>(k) * dt, dt, crew);
+    ++k;
+    if (enough && k % turn == 0 && k < plan.step.substeps && enough()) return false;
+  }
+  return true;
+}
+
+// Has the guard look at the state that the solvers have come to.
+Attempt Simulation::State::look_at(NextStates& next) {
+  const double begin = time();
   Attempt made{{}, {}, halvings};
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     Sheet& sheet = sheets[s];
@@ -428,36 +473,31 @@ Attempt Simulation::State::attempt(Crew& crew, NextStates& next) {
   return made;
 }
 
-// Attempts the next frame until it can be trusted; false: repairs are used up.
-bool Simulation::State::compute_frame(Crew& crew, NextStates& next) {
-  const std::size_t repairs_before = repairs.size();
-  const int halvings_before = halvings;
-  for (const Sheet& sheet : sheets) sheet.good();  // to go back to
-  for (std::optional<Attempt> doubtful;;) {
-    Attempt made = attempt(crew, next);
-    if (made.reason.empty()) return true;
+// Attempts the frame until it can be trusted, repairs are used up, or it is enough.
+FramePart Simulation::State::compute_frame(const Enough& enough, Crew& crew, NextStates& next) {
+  while (take_substeps(enough, crew)) {
+    Attempt made = look_at(next);
+    if (made.reason.empty()) return FramePart::kDone;
+    auto& doubtful = unfinished->doubtful;
     if (doubtful && made.confirms(*doubtful)) {
       // the longer step was right: it goes on from here
       for (std::size_t s = 0; s < sheets.size(); ++s)
         sheets[s].most_strain = std::max(sheets[s].most_strain, 2 * made.sheets[s].strain);
       set_halvings(doubtful->halvings);
-      repairs.resize(repairs_before + static_cast<std::size_t>(halvings - halvings_before));
+      repairs.resize(unfinished->repairs +
+                     static_cast<std::size_t>(halvings - unfinished->halvings));
       go_on_from(next);
-      return true;
+      return FramePart::kDone;
     }
 
-    if (halvings >= scene.solver.max_repairs || 2 * plan.step.substeps > kMaxSubsteps) {
-      failure = "frame " + std::to_string(frame + 1) + " cannot be computed after " +
-                std::to_string(halvings) + " halvings of the step: " + made.reason;
-      return false;
-    }
+    if (!halve("computed", made.reason)) return FramePart::kFailed;
     // back to the last good frame
-    set_halvings(halvings + 1);
-    repairs.push_back({frame + 1, plan.step.substep, made.reason});
     for (Sheet& sheet : sheets)
       sheet.solver->start(sheet.good().x, sheet.good().v, time(), plan.step.substep);
+    unfinished->substeps = 0;
     doubtful = std::move(made);
   }
+  return FramePart::kUnfinished;
 }
 
 // Solvers go on from the end of the frame with the step as it now is.
@@ -491,15 +531,21 @@ bool Simulation::State::keep_to_budget(NextStates& next) {
     if (reason.empty() && !why.empty()) reason = definition.name + ": " + why;
   }
   if (reason.empty()) return true;
-  if (halvings >= scene.solver.max_repairs || 2 * plan.step.substeps > kMaxSubsteps) {
-    failure = "frame " + std::to_string(frame + 1) + " cannot be trusted after " +
+  if (!halve("trusted", reason)) return false;
+  go_on_from(next);
+  for (Sheet& sheet : sheets) sheet.budget = {};
+  return true;
+}
+
+// Repairs the frame under way; false: that is not possible any more.
+bool Simulation::State::halve(const char* what, const std::string& reason) {
+  if (halvings >= scene.solver.max_repairs || 2 * plan.step.substeps > most_substeps) {
+    failure = "frame " + std::to_string(frame + 1) + " cannot be " + what + " after " +
               std::to_string(halvings) + " halvings of the step: " + reason;
     return false;
   }
   set_halvings(halvings + 1);
   repairs.push_back({frame + 1, plan.step.substep, reason});
-  go_on_from(next);
-  for (Sheet& sheet : sheets) sheet.budget = {};
   return true;
 }
 
@@ -523,32 +569,59 @@ std::int64_t Simulation::frame() const { return state_->frame; }
 double Simulation::time() const { return state_->time(); }
 
 std::optional<StepRefusal> Simulation::refusal() const {
-  return find_refusal(state_->plan.step, state_->scene.solver);
+  return state_->refusal_of(state_->plan.step);
 }
 
-bool Simulation::advance_frame(Crew& crew) {
+void Simulation::limit_frame_work(std::int64_t most) {
+  state_->most_substeps = std::min(kMaxSubsteps, most / std::max(1, particle_count()));
+}
+
+bool Simulation::advance_frame(Crew& crew) { return advance_frame({}, crew) == FramePart::kDone; }
+
+FramePart Simulation::advance_frame(const Enough& enough, Crew& crew) {
   assert(!refusal());
   State& state = *state_;
   if (asleep()) {
     state.substeps = 0;
     state.textile_changed = false;
     ++state.frame;
-    return true;
+    return FramePart::kDone;
   }
 
   NextStates& next = next_states(state.sheets.size());
-  if (!state.failure.empty() || !state.change_textiles() || !state.compute_frame(crew, next))
-    return false;
+  if (!state.failure.empty()) return FramePart::kFailed;
+  if (!state.unfinished && !state.begin_frame(enough != nullptr)) return FramePart::kFailed;
+  const FramePart part = state.compute_frame(enough, crew, next);
+  if (part == FramePart::kUnfinished) return part;
+  state.unfinished.reset();
+  if (part == FramePart::kFailed) return part;
   state.substeps = state.plan.step.substeps;
-  if (!state.keep_to_budget(next)) return false;
+  if (!state.keep_to_budget(next)) return FramePart::kFailed;
   state.frames_at_rest = state.quiet(next) ? state.frames_at_rest + 1 : 0;
   for (std::size_t s = 0; s < next.size(); ++s) state.sheets[s].set_good(next[s]);
   ++state.frame;
+  return FramePart::kDone;
+}
+
+double Simulation::frame_share() const {
+  const auto& unfinished = state_->unfinished;
+  if (!unfinished) return 0;
+  return static_cast<double>(unfinished->substeps) /
+         static_cast<double>(state_->plan.step.substeps);
+}
+
+bool Simulation::drop_frame() {
+  auto& unfinished = state_->unfinished;
+  if (!unfinished || !unfinished->before) return false;
+  const Snapshot before = std::move(*unfinished->before);
+  unfinished.reset();
+  state_->go_back_to(before);
   return true;
 }
 
 void Simulation::pack() {
-  if (!state_->failure.empty()) return;  // solvers are beyond the last good frame
+  // solvers are beyond the last good frame
+  if (!state_->failure.empty() || state_->unfinished) return;
   for (Sheet& sheet : state_->sheets) {
     sheet.forget_good();
     sheet.solver->pack();
@@ -573,10 +646,16 @@ bool Simulation::at_rest() const {
 
 bool Simulation::asleep() const { return at_rest() && !state_->scene.environment.wind; }
 
-int Simulation::particle_count() const {
+int Simulation::particle_count() const { return state_->particle_count(); }
+
+int Simulation::State::particle_count() const {
   int count = 0;
-  for (const SheetDefinition& sheet : state_->scene.sheets) count += sheet.particle_count();
+  for (const SheetDefinition& sheet : scene.sheets) count += sheet.particle_count();
   return count;
+}
+
+std::optional<StepRefusal> Simulation::State::refusal_of(const StepPlan& step) const {
+  return find_refusal(step, scene.solver, most_substeps);
 }
 
 namespace {
@@ -632,7 +711,7 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
     state.put_textile(index, textile);
     const Plan plan = state.plan_now();
     state.put_textile(index, now);
-    if (const auto refused = find_refusal(plan.step, state.scene.solver)) return refused;
+    if (const auto refused = state.refusal_of(plan.step)) return refused;
     const std::int64_t begin = state.frame;
     sheet.ramp = {now, textile, begin, begin + static_cast<std::int64_t>(frames)};
   }
@@ -697,7 +776,7 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
   }
   if (plans) {
     Plan plan = state.plan_now();
-    if (const auto refused = find_refusal(plan.step, state.scene.solver)) {
+    if (const auto refused = state.refusal_of(plan.step)) {
       state.adopt(before);
       return refused;
     }
@@ -711,18 +790,33 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
   return std::nullopt;
 }
 
-Snapshot Simulation::snapshot() const {
-  const State& state = *state_;
-  assert(state.failure.empty());
-  Snapshot snapshot{
-      state.frame, state.substeps, state.frames_at_rest, state.halvings, state.plan, state.repairs,
-      {},          handling()};
-  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
-    const Sheet& sheet = state.sheets[s];
-    snapshot.sheets.push_back({state.scene.sheets[s].textile, sheet.most_strain, sheet.good().x,
+Snapshot Simulation::snapshot() const { return state_->snapshot(); }
+
+Snapshot Simulation::State::snapshot() const {
+  assert(failure.empty() && !unfinished);
+  Snapshot snapshot{frame, substeps, frames_at_rest, halvings, plan, repairs, {}, handling()};
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const Sheet& sheet = sheets[s];
+    snapshot.sheets.push_back({scene.sheets[s].textile, sheet.most_strain, sheet.good().x,
                                sheet.good().v, sheet.solver->save(), sheet.ramp, sheet.budget});
   }
   return snapshot;
+}
+
+// Precondition: what was taken since has changed nothing but textiles that ramp.
+void Simulation::State::go_back_to(const Snapshot& before) {
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    if (scene.sheets[s].textile == before.sheets[s].textile) continue;
+    put_textile(s, before.sheets[s].textile);
+    sheets[s].solver = make_solver(scene, stepped(s), sheets[s].dynamics);
+  }
+  [[maybe_unused]] const bool taken = take_over(before);
+  assert(taken);
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const Snapshot::Sheet& saved = before.sheets[s];
+    SheetState good{saved.x, saved.v, kinetic_energy(sheets[s].mesh, saved.v)};
+    sheets[s].set_good(good);
+  }
 }
 
 bool Simulation::restore(const Snapshot& snapshot) {
@@ -736,6 +830,7 @@ bool Simulation::restore(const Snapshot& snapshot) {
     scene.colliders[c].path = snapshot.handling.paths[c];
   if (!find_problems(scene).empty()) return false;
   auto restored = std::make_unique<State>(std::move(scene), state_->make_solver);
+  restored->most_substeps = state_->most_substeps;
   if (!restored->take_over(snapshot)) return false;
   state_ = std::move(restored);
   return true;

@@ -21,6 +21,11 @@ struct FrameStats {
   double largest_strain = 0;    // of the stretch connections
 };
 
+// What became of a frame that is computed in parts.
+enum class FramePart { kDone, kUnfinished, kFailed };
+// Whether a part is long enough.
+using Enough = std::function<bool()>;
+
 class SheetSolver;
 struct Dynamics;
 // Makes what moves a sheet; `dynamics` outlives it.
@@ -45,6 +50,9 @@ class Simulation {
   const Plan& plan() const;
   // Set when the planned or asked step must not be run; advance_frame() is then not called.
   std::optional<StepRefusal> refusal() const;
+  // What a frame may cost, in particles times substeps, beside kMaxSubsteps: neither a plan nor a
+  // repair exceeds it. No limit by default.
+  void limit_frame_work(std::int64_t most);
 
   // Advances by one frame step. A frame that the guard does not trust (core/motion/guard.h) is
   // computed again from the one before it with half the step; where both attempts agree, the motion
@@ -53,6 +61,14 @@ class Simulation {
   // without a substep until a textile or what holds it changes. The crew shares large sheets;
   // frames do not depend on it.
   [[nodiscard]] bool advance_frame(Crew& crew = no_crew());
+  // The same in parts: asks between substeps, and stops where it is enough. As long as the frame is
+  // unfinished, positions, velocities and textiles are undefined, and nothing may be changed.
+  [[nodiscard]] FramePart advance_frame(const Enough& enough, Crew& crew = no_crew());
+  // Of the substeps of an unfinished frame, with the step that it has now; 0 where there is none.
+  double frame_share() const;
+  // Takes an unfinished frame back: all is as it was before, to the bit. False, and nothing done,
+  // where there is none, or where it is so short that it was not worth saving what was before it.
+  [[nodiscard]] bool drop_frame();
   // More than these have nothing to do in a crew.
   int most_hands() const;
   // Lets go of half of its memory, until the next call that needs it: for a while without frames.
@@ -99,7 +115,7 @@ class Simulation {
   // problems_of(actions) is empty.
   std::optional<StepRefusal> act(const std::vector<Action>& actions);
 
-  // Precondition: advance_frame() has not returned false.
+  // Precondition: advance_frame() has not failed, and no frame is unfinished.
   Snapshot snapshot() const;
   // Goes on from there: later frames are equal to the bit to those of the simulation that the
   // snapshot was taken of. False, and nothing changed, where it is none of this scene, whatever its

@@ -12,6 +12,8 @@
 #include <variant>
 #include <vector>
 
+#include "core/plan.h"
+
 namespace weft {
 namespace {
 
@@ -30,6 +32,7 @@ std::vector<Number> numbers(Config& config) {
   ServerOptions& server = config.server;
   Limits& limits = server.limits;
   constexpr std::int64_t kMiB = 1 << 20, kMostParticles = 1'000'000'000;
+  constexpr std::int64_t kMostFrameWork = kMostParticles * kMaxSubsteps;
   return {
       {"port", &server.port, 0, 65535, "Port to listen on; 0 takes a free one"},
       {"workers", &server.worker_threads, 1, 1024, "Threads that advance sessions"},
@@ -38,6 +41,8 @@ std::vector<Number> numbers(Config& config) {
        "Sessions of one principal at a time"},
       {"max_particles", &limits.max_particles_per_session, 4, kMostParticles,
        "Particles in one session"},
+      {"max_frame_work", &limits.max_frame_work, 1, kMostFrameWork,
+       "Particles times substeps of one frame"},
       {"max_particles_per_principal", &limits.max_particles_per_principal, 4, kMostParticles,
        "Particles of one principal"},
       {"max_total_particles", &limits.max_total_particles, 4, kMostParticles,

@@ -31,7 +31,10 @@ v1::Progress wait_for_end(Context& context, const std::string& session) {
         progress.state() != v1::SESSION_STATE_RESTORING) {
       return progress;
     }
-    status.show({fmt::format("running: frame {}", progress.latest_frame())});
+    std::string line = fmt::format("running: frame {}", progress.latest_frame());
+    if (progress.frame_share() > 0)
+      line += fmt::format(", {:.0f} % of the next", 100 * progress.frame_share());
+    status.show({line});
   }
   throw interrupted();
 }

@@ -60,6 +60,21 @@ class View {
     }
   }
 
+  // Of a frame that takes long.
+  void show_share(const v1::Progress& progress) {
+    if (context_.json) return;
+    const std::string line = fmt::format("frame {}: {:.0f} % computed", progress.latest_frame() + 1,
+                                         100 * progress.frame_share());
+    if (context_.terminal.out_is_watched) {
+      auto all = last_ ? lines() : std::vector<std::string>();
+      all.push_back(line);
+      status_.show(std::move(all));
+    } else if (const auto now = Clock::now(); now - last_line_ >= std::chrono::seconds(1)) {
+      context_.terminal.out << line << std::endl;
+      last_line_ = now;
+    }
+  }
+
   // The last frame stays on the screen.
   void finish() {
     if (context_.json || !last_) return;
@@ -122,6 +137,8 @@ bool watch(Context& context, const std::string& session, const WatchOptions& opt
   while (const auto message = feed.next()) {
     if (message->has_header() && std::exchange(to_be_run, false))
       let_run(context, session, options);
+    if (message->has_progress() && message->progress().frame_share() > 0)
+      view.show_share(message->progress());
     if (!message->has_frame()) continue;
     view.show(message->frame());
     if (options.until_rest && message->frame().stats().at_rest()) break;

@@ -35,12 +35,8 @@ grpc::Status refused_step(const Simulation& simulation, const StepRefusal& refus
                                  "is absent, and this integrator has no stable step for this scene "
                                  "to plan with; give one");
   }
-  if (refusal.too_many_substeps) {
-    return errors::field_invalid(
-        solver + "frame_step_s",
-        "a frame would need " + std::to_string(simulation.plan().step.substeps) +
-            " substeps; at most " + std::to_string(kMaxSubsteps) + " are computed");
-  }
+  if (refusal.too_many_substeps)
+    return errors::too_many_substeps(refusal, simulation.particle_count(), solver + "frame_step_s");
   const bool asked = simulation.scene().solver.substep.has_value();
   return errors::step_unstable(refusal, solver + (asked ? "substep_s" : "integrator"));
 }
@@ -155,8 +151,10 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
   if (auto status = refusal(caller, request, id); !status.ok()) return status;
 
   Simulation simulation(std::move(scene));
+  simulation.limit_frame_work(backend_.limits.max_frame_work);
   if (const auto refusal = simulation.refusal()) return refused_step(simulation, *refusal);
-  const SessionIdentity identity = make_identity(id, numerics_id(), caller.principal);
+  const SessionIdentity identity =
+      make_identity(id, numerics_id(), caller.principal, backend_.limits.max_frame_work);
   const auto session = std::make_shared<Session>(identity, std::move(simulation), backend_.host(),
                                                  backend_.store->log_of(identity.uid, 0));
   response = to_proto(*session);
@@ -233,7 +231,15 @@ grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSess
   snapshot.answers.clear();
   past.reach.frame = snapshot.simulation.frame;
 
-  const SessionIdentity identity = make_identity(id, numerics_id(), caller.principal);
+  if (const auto& step = snapshot.simulation.plan.step;
+      step.substeps * source.particle_count() > backend_.limits.max_frame_work) {
+    const StepRefusal refusal{step.substep, step.linear_bound, true, step.substeps,
+                              backend_.limits.max_frame_work / source.particle_count()};
+    return errors::too_many_substeps(refusal, source.particle_count(), "name");
+  }
+
+  const SessionIdentity identity =
+      make_identity(id, numerics_id(), caller.principal, backend_.limits.max_frame_work);
   const auto session =
       std::make_shared<Session>(identity, Simulation(source.scene()), backend_.host(),
                                 backend_.store->log_of(identity.uid, past.first));

@@ -114,6 +114,21 @@ grpc::Status step_unstable(const StepRefusal& step, const std::string& field) {
   return to_grpc(status);
 }
 
+grpc::Status too_many_substeps(const StepRefusal& step, std::int64_t particles,
+                               const std::string& field) {
+  const std::string needed = "a frame would need " + std::to_string(step.substeps) + " substeps";
+  if (step.most_substeps >= kMaxSubsteps) {
+    return field_invalid(field,
+                         needed + "; at most " + std::to_string(kMaxSubsteps) + " are computed");
+  }
+  return exhausted("frame_work",
+                   field + ": " + needed + " of " + std::to_string(particles) +
+                       " particles; this server computes " + std::to_string(step.most_substeps) +
+                       " of so many at most (weftd --max-frame-work). A shorter frame step, a "
+                       "coarser grid or a textile that resists stretch less takes fewer",
+                   false);
+}
+
 grpc::Status request_used() {
   return field_invalid("request_id", "was given to another call; give each call one of its own");
 }

@@ -21,6 +21,9 @@ grpc::Status field_invalid(const std::vector<Problem>& problems);
 grpc::Status field_invalid(const std::string& field, const std::string& message);
 
 // `field` is to blame for the step.
+// A frame of so many particles would need more substeps than are computed.
+grpc::Status too_many_substeps(const StepRefusal& step, std::int64_t particles,
+                               const std::string& field);
 grpc::Status step_unstable(const StepRefusal& step, const std::string& field);
 
 // The request's name came with another call before.

@@ -81,7 +81,7 @@ void FrameCall::offer() {
 
 void FrameCall::tick(Clock::time_point now) {
   std::lock_guard lock(mutex_);
-  read_on(now - last_write_ >= FrameStreams::kProgressInterval);
+  read_on(now - last_write_);
 }
 
 void FrameCall::drain() {
@@ -111,7 +111,8 @@ void FrameCall::on_done() {
   streams_.remove(self);
 }
 
-void FrameCall::read_on(bool progress_due) {
+// silence: since something was written, where it is time to think of Progress.
+void FrameCall::read_on(Clock::duration silence) {
   if (writing_ || finished_) return;
   if (ending_) return finish(*ending_);
   if (!parts_.empty()) return write_part();
@@ -124,11 +125,13 @@ void FrameCall::read_on(bool progress_due) {
       ++backend_.stats.frames_sent;
       return write_part();
     }
-    case Reading::Kind::kNothingYet:
-      if (wants_frame() && (progress_due || reading.progress.state_changes != state_changes_)) {
-        write_progress(reading.progress);
-      }
+    case Reading::Kind::kNothingYet: {
+      const auto interval = reading.progress.frame_share > 0 ? FrameStreams::kLongFrameInterval
+                                                             : FrameStreams::kProgressInterval;
+      const bool due = silence >= interval || reading.progress.state_changes != state_changes_;
+      if (wants_frame() && due) write_progress(reading.progress);
       return;
+    }
     case Reading::Kind::kExpired:
       ++backend_.stats.slow_readers;
       return finish(errors::frame_expired(subscription_->next_frame(), reading.progress));
@@ -186,6 +189,7 @@ void FrameCall::write_progress(const Progress& progress) {
   to->set_oldest_frame(progress.oldest_frame);
   to->set_state(to_proto(progress.state));
   to->set_at_rest(progress.at_rest);
+  to->set_frame_share(progress.frame_share);
   write(encoded(message));
 }
 

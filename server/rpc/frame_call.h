@@ -49,7 +49,7 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   void subscribe(std::optional<std::int64_t> start, SlowReader policy);
   void write_header();
   void write(const grpc::ByteBuffer& message);
-  void read_on(bool progress_due = false);
+  void read_on(Clock::duration silence = {});
   void finish(const grpc::Status& status);
 
   const FrameOrder& order() const { return order_; }

@@ -22,6 +22,7 @@ class FrameStreams {
   // With kTick later a reader hears something every two seconds.
   static constexpr std::chrono::milliseconds kTick{250};
   static constexpr std::chrono::milliseconds kProgressInterval{1750};
+  static constexpr std::chrono::milliseconds kLongFrameInterval{400};
 
   explicit FrameStreams(Stats& stats);
   ~FrameStreams();

@@ -35,6 +35,7 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
   limits->set_max_request_bytes(backend_.limits.max_request_bytes);
   limits->set_max_frame_bytes(backend_.limits.max_frame_bytes);
   limits->set_max_snapshots_per_session(backend_.limits.max_snapshots_per_session);
+  limits->set_max_frame_work(backend_.limits.max_frame_work);
   limits->set_max_tests(backend_.limits.max_tests);
   limits->set_max_total_particles(backend_.limits.max_total_particles);
   limits->set_max_sessions_per_principal(backend_.limits.max_sessions_per_principal);

@@ -144,9 +144,7 @@ grpc::Status to_status(const Refusal& refusal, const Session& session) {
       break;
   }
   if (!refusal.step.too_many_substeps) return errors::step_unstable(refusal.step, refusal.text);
-  return errors::field_invalid(refusal.text, "a frame would need more than " +
-                                                 std::to_string(kMaxSubsteps) +
-                                                 " substeps, the most that are computed");
+  return errors::too_many_substeps(refusal.step, session.particle_count(), refusal.text);
 }
 
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,

@@ -10,6 +10,7 @@ struct Limits {
   std::int64_t max_sessions_per_principal = 100'000;
   std::int64_t max_particles_per_session = 1'000'000;
   std::int64_t max_total_particles = 10'000'000;  // of all sessions
+  std::int64_t max_frame_work = 1'000'000'000;    // particles x substeps
   std::int64_t max_particles_per_principal = 1'000'000'000;
   std::int64_t history_bytes_per_session = 64 << 20;  // frames with their encodings
   std::int64_t max_streams = 1024;                    // but tests of textiles

@@ -44,9 +44,10 @@ std::vector<Textile> textiles_of(const Scene& scene) {
   return textiles;
 }
 
-SessionIdentity make_identity(std::string id, std::string numerics_id, std::string owner) {
-  return {std::move(id), make_uid(), std::move(numerics_id), std::chrono::system_clock::now(),
-          std::move(owner)};
+SessionIdentity make_identity(std::string id, std::string numerics_id, std::string owner,
+                              std::int64_t max_frame_work) {
+  return {std::move(id),    make_uid(),    std::move(numerics_id), std::chrono::system_clock::now(),
+          std::move(owner), max_frame_work};
 }
 
 Session::Session(SessionIdentity identity, Simulation simulation, const SessionHost& host,
@@ -66,6 +67,7 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(simulation_.plan())),
       history_(host.history_bytes) {
+  if (identity_.max_frame_work > 0) simulation_.limit_frame_work(identity_.max_frame_work);
   history_.push(make_frame({}), 0);
 }
 
@@ -166,17 +168,38 @@ void Session::close(Refusal::Why why) {
 
 std::optional<Clock::time_point> Session::run_slice() {
   try {
-    if (!settle()) return std::nullopt;
+    if (!go_on_with_frame() && !settle()) return std::nullopt;
     write_reach();
     const auto due = next_due();
     if (!due || *due > Clock::now()) return due;
     compute_frame(*due);
-    if (!settle()) return std::nullopt;
+    if (!go_on_with_frame() && !settle()) return std::nullopt;
     write_reach();
   } catch (const std::bad_alloc&) {
     fail("the server ran out of memory");
   }
   return next_due();
+}
+
+// Whether a frame is unfinished, which nothing is done before but to drop it.
+bool Session::go_on_with_frame() {
+  if (simulation_.frame_share() == 0) return false;
+  if (!frame_unwanted() || !simulation_.drop_frame()) return true;
+  frame_work_ = {};
+  std::lock_guard lock(mutex_);
+  frame_share_ = 0;
+  return false;
+}
+
+// Whether the frame under way is not to be waited for.
+bool Session::frame_unwanted() const {
+  std::lock_guard lock(mutex_);
+  if (restoring_) return false;
+  const auto pauses = [](const Command& command) {
+    return std::holds_alternative<PauseCommand>(command);
+  };
+  return std::any_of(commands_.begin(), commands_.end(), pauses) ||
+         (steps_begun() && steps_.front().command.cancelled.stop_requested());
 }
 
 // Does what is to be done between two frames; false while it waits for the log.
@@ -604,16 +627,26 @@ void Session::end_step() {
 
 void Session::compute_frame(Clock::time_point due) {
   const auto begin = Clock::now();
-  const bool good = advance_frame();
-  const auto end = Clock::now();
+  const FramePart part = advance_frame();
+  const std::chrono::duration<double> time = Clock::now() - begin;
+  work_ += time;
+  frame_work_ += time;
+  {
+    std::lock_guard lock(mutex_);
+    frame_share_ = part == FramePart::kUnfinished ? simulation_.frame_share() : 0;
+  }
+  if (part != FramePart::kUnfinished) end_frame(part, due);
+}
+
+void Session::end_frame(FramePart part, Clock::time_point due) {
   auto repairs = take_repairs();
-  if (!good) return fail("the solver diverged: " + simulation_.failure());
-  count_frame(end - begin);
+  if (part == FramePart::kFailed) return fail("the solver diverged: " + simulation_.failure());
+  count_frame(std::exchange(frame_work_, {}));
   const auto frame = make_frame(std::move(repairs));
   {
     std::lock_guard lock(mutex_);
     if (closed_) return;
-    used_ = end;
+    const auto end = used_ = Clock::now();
     history_.push(frame, first_held_frame());
     if (simulation_.textile_changed()) {
       textiles_ = textiles_of(simulation_.scene());
@@ -630,7 +663,6 @@ void Session::compute_frame(Clock::time_point due) {
     }
   }
   offer_to_all();
-  work_ += Clock::now() - begin;
   if (snapshot_due() || log_grew()) offer_snapshot();
 }
 
@@ -645,11 +677,18 @@ void Session::count_frame(std::chrono::duration<double> time) {
   stats_.frame_time.add(time);
 }
 
-bool Session::advance_frame() {
+// A slice of it, which is shorter where something else waits for a thread.
+FramePart Session::advance_frame() {
+  constexpr std::chrono::microseconds kSlice{20'000}, kBusySlice{200};
+  const auto begin = Clock::now();
+  const Enough enough = [&] {
+    const auto time = Clock::now() - begin;
+    return time >= kSlice || (time >= kBusySlice && scheduler_.busy());
+  };
   const int most_hands = simulation_.most_hands();
-  if (most_hands == 1) return simulation_.advance_frame();
+  if (most_hands == 1) return simulation_.advance_frame(enough);
   FrameCrew crew(scheduler_, most_hands);
-  return simulation_.advance_frame(crew);
+  return simulation_.advance_frame(enough, crew);
 }
 
 // Those that the last frame took, which are published with it.
@@ -767,7 +806,8 @@ Applied Session::applied(std::int64_t frame) const {
 }
 
 Progress Session::progress() const {
-  return {history_.oldest(), latest(), state_, history_.latest()->at_rest, state_changes_};
+  return {history_.oldest(),          latest(),     state_,
+          history_.latest()->at_rest, frame_share_, state_changes_};
 }
 
 }  // namespace weft

@@ -30,10 +30,13 @@ struct SessionIdentity {
   std::string numerics_id;  // of the server that created it
   std::chrono::system_clock::time_point create_time;
   std::string owner;  // principal; empty: nobody's, made where there were none
+  // Particles times substeps that a frame of it may take; 0: made where there was no such limit.
+  std::int64_t max_frame_work = 0;
 };
 
 // A new session's, with a uid of 128 random bits.
-SessionIdentity make_identity(std::string id, std::string numerics_id, std::string owner = {});
+SessionIdentity make_identity(std::string id, std::string numerics_id, std::string owner = {},
+                              std::int64_t max_frame_work = 0);
 
 // Of each sheet.
 std::vector<Textile> textiles_of(const Scene& scene);
@@ -208,12 +211,15 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   Outcome apply(const Acted& acted);
   void let_go_of_streams();
   void compute_frame(Clock::time_point due);
+  void end_frame(FramePart part, Clock::time_point due);
   bool snapshot_due() const;
   bool log_grew() const;
   void offer_snapshot();
   std::shared_ptr<const SessionSnapshot> snapshot() const;
   bool begin_at(const SessionSnapshot& from, const SessionPast& past);
-  bool advance_frame();
+  bool go_on_with_frame();
+  bool frame_unwanted() const;
+  FramePart advance_frame();
   void count_frame(std::chrono::duration<double> time);
   std::vector<Repair> take_repairs();
   void fail(const std::string& why);
@@ -270,7 +276,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::atomic<int> hands_ = 0;
   const std::chrono::duration<double> snapshot_after_;
   std::chrono::duration<double> work_{};  // since the last snapshot; touched by the slice only
-  std::int64_t entries_in_snapshot_ = 0;  // the last one; touched by the slice only
+  std::chrono::duration<double> frame_work_{};  // of the frame under way; touched by the slice only
+  std::int64_t entries_in_snapshot_ = 0;        // the last one; touched by the slice only
   const std::size_t max_snapshots_;
   const std::chrono::duration<double> reach_interval_;
   const std::chrono::duration<double> return_time_;
@@ -287,6 +294,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::shared_ptr<const Plan> plan_;
   std::vector<Repair> repairs_;
   std::chrono::duration<double> lateness_{};
+  double frame_share_ = 0;  // of the frame under way
   History history_;
   std::vector<Subscription*> subscriptions_;
   bool held_ = false;  // idle until somebody comes, or a subscriber reads on

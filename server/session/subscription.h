@@ -30,6 +30,7 @@ struct Progress {
   std::int64_t latest_frame = 0;
   SessionState state = SessionState::kPaused;
   bool at_rest = false;
+  double frame_share = 0;  // of the next frame's substeps, once it has taken longer than a slice
   std::uint64_t state_changes = 0;  // so far
 };
 

@@ -120,6 +120,7 @@ std::string encode(const KeptSession& session) {
   *to.mutable_create_time() = timestamp_of(session.identity.create_time);
   *to.mutable_scene() = as_given(session.scene);
   to.set_owner(session.identity.owner);
+  to.set_max_frame_work(session.identity.max_frame_work);
   return to.SerializeAsString();
 }
 
@@ -144,7 +145,8 @@ std::string encode(const LogEntry& entry) {
 
 KeptSession decode_session(const std::string& bytes) {
   const auto from = parse<stored::KeptSession>(bytes);
-  return {{from.id(), from.uid(), from.numerics_id(), time_of(from.create_time()), from.owner()},
+  return {{from.id(), from.uid(), from.numerics_id(), time_of(from.create_time()), from.owner(),
+           from.max_frame_work()},
           trusted(to_scene(from.scene(), "scene"))};
 }
 

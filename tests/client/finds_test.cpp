@@ -1,18 +1,26 @@
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
+#include <signal.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <thread>
 
 #include "client/scene_file.h"
 #include "core/model/mesh.h"
 #include "server/rpc/convert.h"
+#include "tests/client/client_test.h"
 #include "tests/support/core/scenes.h"
+#include "tests/support/service/process.h"
+#include "tests/support/temporary_directory.h"
 
 namespace weft::testing {
 namespace {
 
+std::string path_of(const std::string& name) { return WEFT_TEST_DATA_DIR "/finds/" + name; }
+
 Scene find(const std::string& name) {
-  const v1::Scene scene = client::read_scene(std::string(WEFT_TEST_DATA_DIR "/finds/") + name);
+  const v1::Scene scene = client::read_scene(path_of(name));
   return std::get<Scene>(to_scene(scene, "scene"));
 }
 
@@ -130,6 +138,17 @@ TEST(Finds, ABoardAt100MetresPerSecondDoesNotComeThroughTheCloth) {
     ASSERT_TRUE(simulation.advance_frame());
     EXPECT_EQ(behind(scene, simulation, 0.31), 0);
   }
+}
+
+TEST(Finds, AFrameThatTakesMinutesIsWatchedAndEndsWithCtrlC) {
+  const TemporaryDirectory directory;
+  const std::string shown = directory.path("watch.txt");
+  Process watch("weft", {"watch", "--embedded", path_of("long_frame.json")}, shown);
+  while (read_file(shown).find("frame 1: ") == std::string::npos)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  watch.signal(SIGINT);
+  EXPECT_EQ(watch.wait(), 0);
+  EXPECT_THAT(read_file(shown), ::testing::HasSubstr(" % computed\n"));
 }
 
 TEST(Finds, FrictionOnABallTakesWhatTheNormalForceOfACurvedPathAllows) {

@@ -3,6 +3,7 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <random>
 
 #include "core/simulation.h"
 #include "tests/support/core/faulty_solver.h"
@@ -155,6 +156,47 @@ TEST_P(SnapshotOf, ASimulationPackedBetweenFramesIsThatOfOneThatWasNot) {
   expect_same(packed, other);
 }
 
+// Says so by chance.
+Enough now_and_then(std::mt19937& random) {
+  return [&random] { return random() % 4 == 0; };
+}
+
+TEST_P(SnapshotOf, FramesInPartsAreThoseInOneGoAlsoWhereSomeAreDroppedOnTheWay) {
+  Scene scene = busy();
+  GetParam().set(scene);
+  scene.solver.frame_step *= scene.solver.substep ? 12 : 40;  // long enough to be dropped
+  std::mt19937 random(1);
+  const Enough enough = now_and_then(random);
+  Simulation in_parts(scene), other(scene);
+  Textile textile = scene.sheets[0].textile;
+  *textile.damping *= 1.5;
+  int parts = 0, drops = 0;
+  for (int frame = 0; frame < 4; ++frame) {
+    SCOPED_TRACE(frame);
+    if (frame == 1) {
+      ASSERT_FALSE(in_parts.set_textile(0, textile, 2 * scene.solver.frame_step));
+      ASSERT_FALSE(other.set_textile(0, textile, 2 * scene.solver.frame_step));
+    }
+    for (bool done = false; !done; ++parts) {
+      const FramePart part = in_parts.advance_frame(enough);
+      ASSERT_NE(part, FramePart::kFailed);
+      done = part == FramePart::kDone;
+      if (done) break;
+      EXPECT_GT(in_parts.frame_share(), 0);
+      EXPECT_LT(in_parts.frame_share(), 1);
+      in_parts.pack();
+      if (drops > 3 * frame + 2 || !in_parts.drop_frame()) continue;
+      ++drops;
+      EXPECT_EQ(in_parts.frame_share(), 0);
+      expect_same(in_parts, other);
+    }
+    advance(other, 1);
+    expect_same(in_parts, other);
+  }
+  EXPECT_GT(parts, 12);
+  EXPECT_GT(drops, 4);
+}
+
 INSTANTIATE_TEST_SUITE_P(, SnapshotOf, ::testing::ValuesIn(kVariants),
                          [](const auto& each) { return each.param.name; });
 
@@ -186,6 +228,44 @@ TEST(Snapshot, HoldsAndLeadsOnWhatActionsHold) {
     advance(simulation, 1);
     advance(restored, 1);
   }
+}
+
+TEST(Snapshot, AFrameThatIsRepairedInPartsIsTheOneInOneGo) {
+  Scene scene = busy();
+  scene.solver.frame_step *= 40;
+  const Fault fault{.frame = 2, .times = 2, .jump = std::numeric_limits<double>::quiet_NaN()};
+  Simulation in_parts(scene, faulty_solvers(fault)), other(scene, faulty_solvers(fault));
+  std::mt19937 random(1);
+  for (int frame = 0; frame < 3; ++frame) {
+    FramePart part = FramePart::kUnfinished;
+    while (part == FramePart::kUnfinished) part = in_parts.advance_frame(now_and_then(random));
+    ASSERT_EQ(part, FramePart::kDone);
+    advance(other, 1);
+    expect_same(in_parts, other);
+  }
+  EXPECT_EQ(other.repairs().size(), 2);
+}
+
+TEST(Snapshot, NeitherAPlanNorARepairExceedsTheWorkThatAFrameMayCost) {
+  Scene scene = busy();
+  Simulation simulation(scene, faulty_solvers({.frame = 2, .times = 9, .jump = 1e9}));
+  const std::int64_t planned = simulation.plan().step.substeps;
+  simulation.limit_frame_work(63 * planned - 1);
+  ASSERT_TRUE(simulation.refusal());
+  EXPECT_TRUE(simulation.refusal()->too_many_substeps);
+  EXPECT_EQ(simulation.refusal()->substeps, planned);
+  EXPECT_EQ(simulation.refusal()->most_substeps, planned - 1);
+
+  simulation.limit_frame_work(63 * 2 * planned);
+  ASSERT_FALSE(simulation.refusal());
+  Textile stiff = scene.sheets[0].textile;
+  std::get<RawTextile>(stiff.model).stretch *= 100;
+  const auto refused = simulation.set_textile(0, stiff);
+  ASSERT_TRUE(refused);
+  EXPECT_TRUE(refused->too_many_substeps);
+  advance(simulation, 1);
+  EXPECT_FALSE(simulation.advance_frame());
+  EXPECT_EQ(simulation.repairs().size(), 1);
 }
 
 TEST(Snapshot, GoesOnInTheMiddleOfAChangeOfTextile) {

@@ -215,6 +215,41 @@ TEST(Errors, OfLimitsNameTheQuota) {
   EXPECT_TRUE(sessions.retry);
 }
 
+TEST(Errors, OfFramesThatCostTooMuchSayHowMuchAndHowMuchIsAllowed) {
+  Service unlimited;
+  const auto substeps = [&](const v1::Scene& scene) {
+    return unlimited.create(scene).plan().substeps_per_frame();
+  };
+  const v1::Scene scene = small_scene();
+  const std::int64_t most = substeps(scene);
+  ServerOptions options = Service::in_process();
+  options.limits.max_frame_work = 20 * most + 19;
+  Service service(options);
+  EXPECT_EQ(service.info().limits().max_frame_work(), 20 * most + 19);
+  const v1::Session session = service.create(scene);
+  const auto expect_refused = [&](const Error& error) {
+    expect_error(error, grpc::StatusCode::RESOURCE_EXHAUSTED, "QUOTA_EXCEEDED");
+    EXPECT_EQ(error.quota.violations(0).subject(), "frame_work");
+    EXPECT_THAT(error.message, HasSubstr("of 20 particles"));
+    EXPECT_THAT(error.message, HasSubstr("computes " + std::to_string(most) + " of so many"));
+    EXPECT_FALSE(error.retry);
+  };
+
+  v1::Scene longer = scene;
+  longer.mutable_solver()->set_frame_step_s(2 * session.scene().solver().frame_step_s());
+  const Error created = service.create_error(longer);
+  expect_refused(created);
+  EXPECT_THAT(created.message, HasSubstr(std::to_string(substeps(longer)) + " substeps"));
+  EXPECT_THAT(created.message, HasSubstr("session.scene.solver.frame_step_s"));
+
+  v1::UpdateTextileRequest update;
+  update.set_name(session.name());
+  update.mutable_textile()->mutable_raw()->set_stretch_n_per_m(1e6);
+  update.mutable_update_mask()->add_paths("raw.stretch_n_per_m");
+  expect_refused(service.error(&Sessions::UpdateTextile, update));
+  service.step(session, 3);
+}
+
 TEST(Errors, OfAServerThatDrainsSaySo) {
   Service service;
   const v1::Session session = service.create();

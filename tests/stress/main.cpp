@@ -23,6 +23,7 @@ constexpr std::array kTests{
     Test{"lossless", weft::stress::lossless},
     Test{"real-time", weft::stress::real_time},
     Test{"fan-out", weft::stress::fan_out},
+    Test{"long-frames", weft::stress::long_frames},
     Test{"churn", weft::stress::churn},
     Test{"slow-readers", weft::stress::slow_readers},
     Test{"view-age", weft::stress::view_age},

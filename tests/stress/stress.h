@@ -18,6 +18,7 @@ struct Outcome {
 Outcome lossless(Form form);
 Outcome real_time(Form form);
 Outcome fan_out(Form form);
+Outcome long_frames(Form form);
 Outcome churn(Form form);
 Outcome slow_readers(Form form);
 Outcome view_age(Form form);

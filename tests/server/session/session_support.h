@@ -68,7 +68,7 @@ class Watcher : public FrameSink, public std::enable_shared_from_this<Watcher> {
   void wait_for_state(SessionState state);
   void leave();
 
-  Subscription& subscription() { return *subscription_; }
+  Subscription& subscription() const { return *subscription_; }
 
  private:
   void wait_until(const std::function<bool()>& met);

@@ -325,6 +325,96 @@ TEST(Session, AStepEndsWithItsCaller) {
   EXPECT_GT(step(*session, 1).applied().frame, 5) << "the session is fine";
 }
 
+// A frame of it takes minutes.
+Scene endless_scene() {
+  Scene scene = hung_scene();
+  scene.sheets[0].grid = {30, 30, 0.05};
+  scene.solver.plain = true;
+  scene.solver.frame_step *= 900'000 / static_cast<double>(Simulation(scene).plan().step.substeps);
+  return scene;
+}
+
+void wait_for_part_of_a_frame(const Watcher& watcher) {
+  while (watcher.subscription().progress().frame_share == 0) std::this_thread::sleep_for(1ms);
+}
+
+TEST(Session, PausingDropsAFrameThatTakesLong) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler, endless_scene());
+  const auto watcher = Watcher::of(*session, 0);
+  const auto expect_dropped = [&] {
+    wait_for_part_of_a_frame(*watcher);
+    EXPECT_EQ(pause(*session).applied().newest, 0);
+    EXPECT_EQ(watcher->subscription().progress().frame_share, 0);
+  };
+  Answer stepping = step(*session, 2);
+  expect_dropped();
+  EXPECT_EQ(stepping.refused(), Refusal::Why::kInterrupted);
+  run(*session).applied();
+  expect_dropped();
+}
+
+TEST(Session, AStepWhoseCallerGoesAwayDropsAFrameThatTakesLong) {
+  Scheduler scheduler(2);
+  const auto session = make_session(scheduler, endless_scene());
+  const auto watcher = Watcher::of(*session, 0);
+  std::stop_source caller;
+  Answer stepping(*session, StepCommand{1, {}, caller.get_token(), {}, {}});
+  wait_for_part_of_a_frame(*watcher);
+  caller.request_stop();
+  session->wake();
+  EXPECT_EQ(stepping.refused(), Refusal::Why::kCancelled);
+}
+
+TEST(Session, WithAFrameThatTakesLongLeavesTheirTurnsToOthersAndEndsAtOnce) {
+  Scheduler scheduler(1);
+  const auto session = make_session(scheduler, endless_scene());
+  run(*session).applied();
+  EXPECT_EQ(step(*make_session(scheduler), 50).applied().newest, 50);
+  Answer change = set_bend(*session, 1e-4);
+  session->close(Refusal::Why::kDeleted);
+  EXPECT_EQ(change.refused(), Refusal::Why::kDeleted);
+}
+
+TEST(Session, FramesThatTakeLongAreTheSolversWhateverIsAskedMeanwhile) {
+  Scheduler scheduler(2);
+  Scene scene = hung_scene();
+  scene.solver.plain = true;
+  scene.solver.frame_step *= 3000;
+  Simulation alone(scene);
+  const auto session = make_session(scheduler, scene);
+  const auto watcher = Watcher::of(*session, 0);
+  watcher->read();
+  run(*session).applied();
+  wait_for_part_of_a_frame(*watcher);
+  pause(*session).applied();
+  for (int i = 0; i < 3; ++i) {
+    run(*session).applied();
+    wait_for_part_of_a_frame(*watcher);
+    pause(*session).applied();
+  }
+  Answer stepping = step(*session, 2);
+  wait_for_part_of_a_frame(*watcher);
+  const std::int64_t changed = set_bend(*session, 1e-4).applied().frame;
+  stepping.applied();
+  const std::int64_t last = session->status().newest->number;
+  for (std::int64_t number = 1; number <= last; ++number) {
+    if (number == changed) {
+      Textile textile = alone.scene().sheets[0].textile;
+      std::get<RawTextile>(textile.model).bend = 1e-4;
+      ASSERT_FALSE(alone.set_textile(0, textile));
+    }
+    ASSERT_TRUE(alone.advance_frame());
+    const auto frame = watcher->read().frame;
+    ASSERT_TRUE(frame);
+    std::vector<double> expected(frame->positions.size());
+    alone.copy_positions(expected);
+    EXPECT_EQ(frame->positions, expected) << number;
+    EXPECT_EQ(frame->substeps, alone.substeps());
+  }
+  EXPECT_LE(changed, last);
+}
+
 TEST(Session, ASolverThatDivergesFailsTheSessionAndItsGoodFramesStay) {
   Scheduler scheduler(2);
   const auto session = make_session(scheduler, diverging_scene());

@@ -283,7 +283,9 @@ void warn(const Scene& scene, const std::vector<SheetShape>& shapes,
       plan.warnings.push_back(
           {"BOX_EDGES", "colliders[" + std::to_string(c) + "].box",
            "only particles are kept out: an edge of the box may cut through the "
-           "cells between them"});
+           "cells between them, and cells that are pulled over an edge may stay hooked on it, "
+           "stretched by half for good. A finer grid, a larger skin_m or a capsule along the "
+           "edge helps"});
   for (std::size_t s = 0; s < shapes.size(); ++s) {
     warn_of_bending(scene, s, shapes[s].mesh, plan);
     warn_of_tension(scene.sheets[s], s, plan);

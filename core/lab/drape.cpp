@@ -12,6 +12,9 @@ namespace weft {
 namespace {
 
 constexpr double kRadius = 0.15, kHeldRadius = 0.09;  // m
+// Where none are given: until one changes the coefficient by less than so many points.
+const std::vector<double> kSpacings = {0.015, 0.01, 0.008, 0.0065, 0.005};  // m
+constexpr double kSettled = 2;
 constexpr int kMargin = 2;  // particles of the square around the disc, so that no edge is near
 
 int half_side(double radius, double spacing) {
@@ -148,8 +151,8 @@ int folds(const std::vector<double>& radii) {
   return count;
 }
 
-// What light from above shows of a disc at rest.
-void look(const Specimen& disc, const Matrix3Xd& rest, LabReport& report) {
+// What light from above shows of a disc at rest: its drape coefficient, %.
+double look(const Specimen& disc, const Matrix3Xd& rest, LabReport& report) {
   constexpr int kAngles = 360;
   const Shadow shadow(disc.mesh, rest), flat(disc.mesh, disc.start);
   const double held = std::numbers::pi * kHeldRadius * kHeldRadius;
@@ -160,13 +163,15 @@ void look(const Specimen& disc, const Matrix3Xd& rest, LabReport& report) {
     if (k < kAngles) radii.push_back(radius / flat.radius(angle));
     outline.rows.push_back({radius * std::cos(angle), radius * std::sin(angle)});
   }
-  report.values.push_back(value("drape coefficient", "%", disc, std::nullopt,
-                                100 * (shadow.area() - held) / (flat.area() - held)));
+  const double coefficient = 100 * (shadow.area() - held) / (flat.area() - held);
+  report.values.push_back(value("drape coefficient", "%", disc, std::nullopt, coefficient));
   report.values.push_back(value("folds", "", disc, std::nullopt, folds(radii)));
   report.curves.push_back(std::move(outline));
+  return coefficient;
 }
 
-void hang(const LabOrder& order, double spacing, const std::stop_token& stop, LabReport& report) {
+// Returns the drape coefficient, %.
+double hang(const LabOrder& order, double spacing, const std::stop_token& stop, LabReport& report) {
   const MeasuredTextile textile = along_warp(order);
   const bool isometric = std::holds_alternative<Isometric>(order.bending);
   Specimen disc = cut_disc(textile, order.bending, kRadius, kHeldRadius, spacing);
@@ -188,7 +193,7 @@ void hang(const LabOrder& order, double spacing, const std::stop_token& stop, La
     start = settle(cut_disc(textile, Isometric{}, kRadius, kHeldRadius, spacing), start).x;
   const Equilibrium rest = settle(disc, start);
   note_unsettled(rest, tolerance, report);
-  look(disc, rest.x, report);
+  return look(disc, rest.x, report);
 }
 
 }  // namespace
@@ -266,13 +271,24 @@ LabReport drape(const LabOrder& order, const LabWatch& watch) {
       "The drape coefficient is the share of the free ring that light from above cannot pass; "
       "folds are the bulges of the shadow's outline. No theory has an answer; compare with a "
       "measured one. A sheet has many shapes at rest: this one is reached from the flat disc.";
-  std::vector<double> spacings = order.spacings;
-  if (spacings.empty()) {
-    spacings = {0.02, 0.015};
-    if (std::holds_alternative<Isometric>(order.bending)) spacings.push_back(0.01);
-  }
-  for_each_specimen(spacings, watch,
-                    [&](double spacing) { hang(order, spacing, watch.stop, report); });
+  const bool refines = order.spacings.empty();
+  LabWatch until = watch;
+  std::stop_source enough;
+  const std::stop_callback stopped(watch.stop, [&] { enough.request_stop(); });
+  until.stop = enough.get_token();
+  std::optional<double> before;
+  double change = 0;
+  for_each_specimen(refines ? kSpacings : order.spacings, until, [&](double spacing) {
+    const double found = hang(order, spacing, watch.stop, report);
+    if (before) change = std::abs(found - *before);
+    if (refines && before && change < kSettled) enough.request_stop();
+    before = found;
+  });
+  if (refines && !watch.stop.stop_requested())
+    report.notes.push_back(
+        join("refined until the next spacing changes the coefficient by less than ", kSettled,
+             " points: the last one by ", change,
+             change < kSettled ? "" : ", which is more; give finer ones as spacings_m"));
   report.notes.emplace_back(
       "without the friction inside cloth it hangs limper than cloth of the same measured rigidity; "
       "folds pass through each other where they touch");

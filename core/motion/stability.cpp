@@ -221,7 +221,7 @@ double damping_for(const Mesh& mesh, double ratio) {
 }
 
 double safe_share(double connection_ratio) {
-  constexpr double kLeast = 0.45, kAtRatio = 1e-4, kMost = 0.9, kSafe = 0.9 * kSafeDampingRatio;
+  constexpr double kLeast = 0.45, kAtRatio = 1e-4, kMost = 0.9, kSafe = 0.98 * kSafeDampingRatio;
   if (connection_ratio >= kSafe) return 1;
   const double along =
       std::log(std::max(connection_ratio, kAtRatio) / kAtRatio) / std::log(kSafe / kAtRatio);

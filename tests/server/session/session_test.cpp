@@ -370,7 +370,13 @@ TEST(Session, WithAFrameThatTakesLongLeavesTheirTurnsToOthersAndEndsAtOnce) {
   Scheduler scheduler(1);
   const auto session = make_session(scheduler, endless_scene());
   run(*session).applied();
-  EXPECT_EQ(step(*make_session(scheduler), 50).applied().newest, 50);
+  std::vector<std::shared_ptr<Session>> others;
+  std::vector<Answer> answers;
+  for (int i = 0; i < 20; ++i) {
+    others.push_back(make_session(scheduler));
+    answers.push_back(step(*others.back(), 50));
+  }
+  for (Answer& each : answers) EXPECT_EQ(each.applied().newest, 50);
   Answer change = set_bend(*session, 1e-4);
   session->close(Refusal::Why::kDeleted);
   EXPECT_EQ(change.refused(), Refusal::Why::kDeleted);

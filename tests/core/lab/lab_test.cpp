@@ -224,6 +224,26 @@ TEST(Lab, AStiffDiscBendsAsAnAnnularPlateDoes) {
   EXPECT_NEAR(found / asked, 1, 0.05);
 }
 
+TEST(Lab, ADiscIsRefinedUntilTheNextSpacingChangesItsShadowByLessThanTwoPoints) {
+  MeasuredTextile board = wool();
+  board.bend_rigidity_warp = board.bend_rigidity_weft = 0.1;
+  const auto coefficients = [](const LabReport& report) {
+    std::vector<double> found;
+    for (const LabValue& value : named(report, "drape coefficient")) found.push_back(value.found);
+    return found;
+  };
+  EXPECT_EQ(coefficients(run(LabTest::kDrape, Isometric{}, {}, board)).size(), 2);
+  const LabReport report = run(LabTest::kDrape, Isometric{}, {}, wool());
+  const std::vector<double> found = coefficients(report);
+  ASSERT_GT(found.size(), 2);
+  for (std::size_t k = 1; k < found.size(); ++k)
+    EXPECT_EQ(std::abs(found[k] - found[k - 1]) < 2, k + 1 == found.size());
+  const auto says_so = [](const std::string& note) {
+    return note.find("less than 2 points: the last one by ") != std::string::npos;
+  };
+  EXPECT_EQ(std::count_if(report.notes.begin(), report.notes.end(), says_so), 1);
+}
+
 TEST(Lab, StifferTextilesThrowALargerShadow) {
   double before = 0;
   for (const double factor : {1.0, 10.0, 1000.0}) {

@@ -1,0 +1,39 @@
+#include <sstream>
+
+#include "tests/client/client_test.h"
+
+// What the README shows, and what depends on how frames are computed.
+namespace weft::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(Readme, ShowsWhatItsCommandsAnswer) {
+  const std::string readme = read_file(WEFT_TEST_DATA_DIR "/../../README.md");
+  const TemporaryDirectory directory;
+  const std::string scene = directory.path("scene.json"), file = directory.path("again.weft");
+  const auto answer = [](const std::vector<std::string>& arguments) {
+    const Outcome outcome = run_weft(arguments);
+    EXPECT_EQ(outcome.exit, 0) << outcome.err;
+    return outcome.out;
+  };
+  answer({"scene", "new", "--template", "sphere", "--textile", "wool_tropical", "-o", scene,
+          "--embedded"});
+  const std::string recorded = answer({"record", scene, "--embedded", "--until-rest", "-o", file});
+  EXPECT_THAT(readme, HasSubstr(recorded.substr(recorded.find(": "))));
+
+  // what it says of the scene and of the recording, but for names, times and sizes
+  std::istringstream lines(answer({"scene", "check", scene, "--embedded"}) +
+                           answer({"info", file}));
+  for (std::string line; std::getline(lines, line);) {
+    const bool differs = line.starts_with("recorded") || line.starts_with("session") ||
+                         line.starts_with("uid") || line.find("scene.json: ") != line.npos ||
+                         line.find("again.weft") != line.npos;
+    if (!differs) {
+      EXPECT_THAT(readme, HasSubstr("    " + line + '\n'));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -74,14 +74,14 @@ struct Attempt {
   }
 };
 
-// Held particles go where their paths lead.
-void lead_pins(const SheetDefinition& definition, double time, double dt, Sheet& sheet) {
+// Held particles follow the paths of their pins.
+void move_pins(const SheetDefinition& definition, double time, double dt, Sheet& sheet) {
   for (const Pin& pin : definition.pins) {
     if (pin.path.empty()) continue;
     const Vector3d offset = offset_at(pin.path, time);
     const Vector3d displacement = offset - offset_at(pin.path, time - dt);
     for (const int i : pin.particles) {
-      sheet.solver->lead(i, sheet.start(i) + offset, displacement);
+      sheet.solver->move_held(i, sheet.start(i) + offset, displacement);
     }
   }
 }
@@ -124,13 +124,13 @@ double end_of_paths(const Scene& scene) {
   return end;
 }
 
-// Positions and velocities of all sheets, as they go on with other forces or another step.
-struct Course {
+// Positions and velocities of all sheets, to begin again with other forces or another step.
+struct SheetStates {
   std::vector<Matrix3Xd> x, v;
 };
 
-// Gives led particles the velocity of their paths in a step from `time` on.
-void set_led_velocities(const std::vector<Pin>& pins, double time, double dt, Matrix3Xd& v) {
+// Gives held particles the velocity of their paths in a step from `time` on.
+void set_pin_velocities(const std::vector<Pin>& pins, double time, double dt, Matrix3Xd& v) {
   for (const Pin& pin : pins)
     for (const int i : pin.particles)
       v.col(i) = (offset_at(pin.path, time + dt) - offset_at(pin.path, time)) / dt;
@@ -179,14 +179,14 @@ struct Simulation::State {
   std::optional<StepRefusal> set_textile(std::size_t sheet, const Textile& textile);
   bool change_textiles();
   void bind_forces();
-  void step(double time, double dt, Crew& crew);
+  void step(double time, double dt, ThreadPool& pool);
   bool begin_frame(bool in_parts);
-  FramePart compute_frame(const Enough& enough, Crew& crew, NextStates& next);
-  bool take_substeps(const Enough& enough, Crew& crew);
+  FramePart compute_frame(const Enough& enough, ThreadPool& pool, NextStates& next);
+  bool take_substeps(const Enough& enough, ThreadPool& pool);
   Attempt look_at(NextStates& next);
   bool halve(const char* what, const std::string& reason);
   bool keep_to_budget(NextStates& next);
-  void go_on_from(NextStates& next);
+  void restart_from(NextStates& next);
   bool quiet(const NextStates& next) const;
   void set_halvings(int count);
   int particle_count() const;
@@ -197,8 +197,8 @@ struct Simulation::State {
   Moment moment() const;
   void adopt(Handling handling);
   VectorXd planned_inverse_mass(std::size_t sheet) const;
-  Course course() const;
-  void go_on(const Course& course, double old_dt, const std::vector<bool>& changed);
+  SheetStates closing_states() const;
+  void restart(const SheetStates& states, double old_dt, const std::vector<bool>& changed);
   Plan plan_for(const std::vector<Matrix3Xd>& x) const;
   bool take_over(const Snapshot& snapshot);
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
@@ -220,19 +220,19 @@ SheetDefinition Simulation::State::stepped(std::size_t sheet) const {
 }
 
 // One substep, from `time` to `time` + dt.
-void Simulation::State::step(double time, double dt, Crew& crew) {
+void Simulation::State::step(double time, double dt, ThreadPool& pool) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     Sheet& sheet = sheets[s];
     const SheetDefinition& definition = scene.sheets[s];
 
     // forces and motion
-    sheet.solver->advance(time, crew);
-    lead_pins(definition, time + dt, dt, sheet);
+    sheet.solver->advance(time, pool);
+    move_pins(definition, time + dt, dt, sheet);
 
     // contact last, so that no particle ends a step inside a collider
     if (!scene.colliders.empty())
       sheet.solver->resolve(
-          Contacts(scene.colliders, definition.textile.friction, sheet.skin, time + dt, dt), crew);
+          Contacts(scene.colliders, definition.textile.friction, sheet.skin, time + dt, dt), pool);
   }
 }
 
@@ -273,7 +273,7 @@ Simulation::State::State(Scene given, SolverFactory factory)
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const SheetDefinition definition = stepped(s);
     Matrix3Xd v = start_velocities(definition);
-    set_led_velocities(definition.pins, 0, dt, v);
+    set_pin_velocities(definition.pins, 0, dt, v);
     sheets[s].solver = make_solver(scene, definition, sheets[s].dynamics);
     sheets[s].solver->start(x[s], v, 0, dt);
     sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
@@ -328,23 +328,23 @@ Moment Simulation::State::moment() const {
           [this](std::size_t s, int i) { return sheets[s].good().x.col(i); }};
 }
 
-Course Simulation::State::course() const {
-  Course course;
+SheetStates Simulation::State::closing_states() const {
+  SheetStates states;
   for (const Sheet& sheet : sheets) {
-    course.x.push_back(sheet.good().x);
-    sheet.solver->closing_velocities(time(), course.v.emplace_back());
+    states.x.push_back(sheet.good().x);
+    sheet.solver->closing_velocities(time(), states.v.emplace_back());
   }
-  return course;
+  return states;
 }
 
 // Sheets whose forces and step stay go on as they were.
-void Simulation::State::go_on(const Course& course, double old_dt,
-                              const std::vector<bool>& changed) {
+void Simulation::State::restart(const SheetStates& states, double old_dt,
+                                const std::vector<bool>& changed) {
   const double dt = plan.step.substep;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     sheets[s].budget = {};
     if (!changed[s] && dt == old_dt) continue;
-    sheets[s].solver->start(course.x[s], course.v[s], time(), dt);
+    sheets[s].solver->start(states.x[s], states.v[s], time(), dt);
     sheets[s].read_good();
   }
 }
@@ -363,7 +363,7 @@ Plan Simulation::State::plan_now() const {
 std::optional<StepRefusal> Simulation::State::set_textile(std::size_t sheet,
                                                           const Textile& textile) {
   const double dt = plan.step.substep;
-  const Course before = course();
+  const SheetStates before = closing_states();
   const Textile old = scene.sheets[sheet].textile;
   put_textile(sheet, textile);
   Plan made = plan_now();
@@ -375,7 +375,7 @@ std::optional<StepRefusal> Simulation::State::set_textile(std::size_t sheet,
   sheets[sheet].solver = make_solver(scene, stepped(sheet), sheets[sheet].dynamics);
   std::vector<bool> changed(sheets.size());
   changed[sheet] = true;
-  go_on(before, dt, changed);
+  restart(before, dt, changed);
   return std::nullopt;
 }
 
@@ -445,12 +445,12 @@ bool Simulation::State::begin_frame(bool in_parts) {
 }
 
 // Takes those that the attempt has left; false: some still are, and it is enough.
-bool Simulation::State::take_substeps(const Enough& enough, Crew& crew) {
+bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   constexpr int kParticles = 4096;  // whose substep takes longer than to ask
   const std::int64_t turn = std::max(1, kParticles / particle_count());
   const double begin = time(), dt = plan.step.substep;
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
-    step(begin + static_cast<double>(k) * dt, dt, crew);
+    step(begin + static_cast<double>(k) * dt, dt, pool);
     ++k;
     if (enough && k % turn == 0 && k < plan.step.substeps && enough()) return false;
   }
@@ -478,8 +478,9 @@ Attempt Simulation::State::look_at(NextStates& next) {
 }
 
 // Attempts the frame until it can be trusted, repairs are used up, or it is enough.
-FramePart Simulation::State::compute_frame(const Enough& enough, Crew& crew, NextStates& next) {
-  while (take_substeps(enough, crew)) {
+FramePart Simulation::State::compute_frame(const Enough& enough, ThreadPool& pool,
+                                           NextStates& next) {
+  while (take_substeps(enough, pool)) {
     Attempt made = look_at(next);
     if (made.reason.empty()) return FramePart::kDone;
     auto& doubtful = unfinished->doubtful;
@@ -490,7 +491,7 @@ FramePart Simulation::State::compute_frame(const Enough& enough, Crew& crew, Nex
       set_halvings(doubtful->halvings);
       repairs.resize(unfinished->repairs +
                      static_cast<std::size_t>(halvings - unfinished->halvings));
-      go_on_from(next);
+      restart_from(next);
       return FramePart::kDone;
     }
 
@@ -505,7 +506,7 @@ FramePart Simulation::State::compute_frame(const Enough& enough, Crew& crew, Nex
 }
 
 // Solvers go on from the end of the frame with the step as it now is.
-void Simulation::State::go_on_from(NextStates& next) {
+void Simulation::State::restart_from(NextStates& next) {
   const double end = time() + scene.solver.frame_step;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     Matrix3Xd v;
@@ -536,7 +537,7 @@ bool Simulation::State::keep_to_budget(NextStates& next) {
   }
   if (reason.empty()) return true;
   if (!halve("trusted", reason)) return false;
-  go_on_from(next);
+  restart_from(next);
   for (Sheet& sheet : sheets) sheet.budget = {};
   return true;
 }
@@ -580,9 +581,11 @@ void Simulation::limit_frame_work(std::int64_t most) {
   state_->most_substeps = std::min(kMaxSubsteps, most / std::max(1, particle_count()));
 }
 
-bool Simulation::advance_frame(Crew& crew) { return advance_frame({}, crew) == FramePart::kDone; }
+bool Simulation::advance_frame(ThreadPool& pool) {
+  return advance_frame({}, pool) == FramePart::kDone;
+}
 
-FramePart Simulation::advance_frame(const Enough& enough, Crew& crew) {
+FramePart Simulation::advance_frame(const Enough& enough, ThreadPool& pool) {
   assert(!refusal());
   State& state = *state_;
   if (asleep()) {
@@ -595,7 +598,7 @@ FramePart Simulation::advance_frame(const Enough& enough, Crew& crew) {
   NextStates& next = next_states(state.sheets.size());
   if (!state.failure.empty()) return FramePart::kFailed;
   if (!state.unfinished && !state.begin_frame(enough != nullptr)) return FramePart::kFailed;
-  const FramePart part = state.compute_frame(enough, crew, next);
+  const FramePart part = state.compute_frame(enough, pool, next);
   if (part == FramePart::kUnfinished) return part;
   state.unfinished.reset();
   if (part == FramePart::kFailed) return part;
@@ -623,18 +626,18 @@ bool Simulation::drop_frame() {
   return true;
 }
 
-void Simulation::pack() {
+void Simulation::release_memory() {
   // solvers are beyond the last good frame
   if (!state_->failure.empty() || state_->unfinished) return;
   for (Sheet& sheet : state_->sheets) {
     sheet.forget_good();
-    sheet.solver->pack();
+    sheet.solver->release_memory();
   }
 }
 
-int Simulation::most_hands() const {
+int Simulation::most_threads() const {
   int most = 1;
-  for (const Sheet& sheet : state_->sheets) most = std::max(most, sheet.solver->most_hands());
+  for (const Sheet& sheet : state_->sheets) most = std::max(most, sheet.solver->most_threads());
   return most;
 }
 
@@ -764,7 +767,7 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
     return std::nullopt;
   }
 
-  Course course = state.course();
+  SheetStates states = state.closing_states();
   const double dt = state.plan.step.substep;
   std::vector<VectorXd> held, planned;
   for (std::size_t s = 0; s < state.sheets.size(); ++s) {
@@ -787,9 +790,9 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
     state.plan = std::move(plan);
   }
   for (std::size_t s = 0; s < state.sheets.size(); ++s)
-    set_led_velocities(state.scene.sheets[s].pins, state.time(), state.plan.step.substep,
-                       course.v[s]);
-  state.go_on(course, dt, changed);
+    set_pin_velocities(state.scene.sheets[s].pins, state.time(), state.plan.step.substep,
+                       states.v[s]);
+  state.restart(states, dt, changed);
   state.frames_at_rest = 0;
   return std::nullopt;
 }

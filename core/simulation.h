@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/model/scene.h"
-#include "core/motion/crew.h"
+#include "core/motion/thread_pool.h"
 #include "core/plan.h"
 #include "core/snapshot.h"
 
@@ -58,22 +58,22 @@ class Simulation {
   // computed again from the one before it with half the step; where both attempts agree, the motion
   // is real and the step stays. After scene().solver.max_repairs repairs it returns false for good,
   // with the state of the last good frame. A scene at rest, without wind, sleeps: the frame repeats
-  // without a substep until a textile or what holds it changes. The crew shares large sheets;
+  // without a substep until a textile or what holds it changes. The pool shares large sheets;
   // frames do not depend on it.
-  [[nodiscard]] bool advance_frame(Crew& crew = no_crew());
+  [[nodiscard]] bool advance_frame(ThreadPool& pool = calling_thread());
   // The same in parts: asks between substeps, and stops where it is enough. As long as the frame is
   // unfinished, positions, velocities and textiles are undefined, and nothing may be changed.
-  [[nodiscard]] FramePart advance_frame(const Enough& enough, Crew& crew = no_crew());
+  [[nodiscard]] FramePart advance_frame(const Enough& enough, ThreadPool& pool = calling_thread());
   // Of the substeps of an unfinished frame, with the step that it has now; 0 where there is none.
   double frame_share() const;
   // Takes an unfinished frame back: all is as it was before, to the bit. False, and nothing done,
   // where there is none, or where it is so short that it was not worth saving what was before it.
   [[nodiscard]] bool drop_frame();
-  // More than these have nothing to do in a crew.
-  int most_hands() const;
+  // More than these have nothing to do in a pool.
+  int most_threads() const;
   // Lets go of half of its memory, until the next call that needs it: for a while without frames.
   // Changes nothing else.
-  void pack();
+  void release_memory();
   // All so far.
   const std::vector<Repair>& repairs() const;
   // Why advance_frame() returned false.

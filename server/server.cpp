@@ -72,13 +72,13 @@ std::unique_ptr<SessionStore> open_store(const ServerOptions& options) {
 }
 
 // Until it is told to stop.
-void retire(const std::stop_token& stop, Backend& backend, std::chrono::milliseconds idle) {
+void evict(const std::stop_token& stop, Backend& backend, std::chrono::milliseconds idle) {
   std::mutex mutex;
   std::condition_variable_any never;
   std::unique_lock lock(mutex);
   while (!stop.stop_requested()) {
     never.wait_for(lock, stop, idle / 8, [] { return false; });
-    if (!stop.stop_requested()) retire_sessions(backend, idle);
+    if (!stop.stop_requested()) evict_sessions(backend, idle);
   }
 }
 
@@ -99,7 +99,7 @@ struct Server::Parts {
   LabService lab{backend};
   std::unique_ptr<grpc::Server> grpc;
   std::optional<Metrics> metrics;
-  std::jthread retirement;
+  std::jthread eviction;
   bool stopped = false;
 };
 
@@ -132,7 +132,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
        },
        [backend = &parts_->backend](const std::string& id) { adopt_session(*backend, id); }});
   if (options.idle.count() > 0 && (options.database || options.data_dir))
-    parts_->retirement = std::jthread(retire, std::ref(parts_->backend), options.idle);
+    parts_->eviction = std::jthread(evict, std::ref(parts_->backend), options.idle);
   for (const char* service : kServices) {
     parts_->grpc->GetHealthCheckService()->SetServingStatus(service, true);
   }
@@ -170,7 +170,7 @@ void Server::stop(std::chrono::milliseconds deadline) {
   if (!parts_->grpc || std::exchange(parts_->stopped, true)) return;
   parts_->grpc->GetHealthCheckService()->Shutdown();  // NOT_SERVING
   parts_->backend.draining = true;
-  parts_->retirement.request_stop();
+  parts_->eviction.request_stop();
 
   // end every call ourselves, and let the answers leave: gRPC would wait for ever, or drop them
   const auto end = Clock::now() + deadline;

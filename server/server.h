@@ -24,7 +24,7 @@ struct ServerOptions {
   std::optional<ServerTls> tls;         // absent: unencrypted
   std::optional<std::string> tokens;    // file of Access; absent: nobody needs one
   int snapshot_ms = 2000;               // SessionHost::snapshot_after
-  std::chrono::milliseconds idle = std::chrono::hours(1);  // retire_sessions(); 0: never
+  std::chrono::milliseconds idle = std::chrono::hours(1);  // evict_sessions(); 0: never
   Limits limits;
 };
 

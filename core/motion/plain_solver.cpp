@@ -15,16 +15,16 @@ class PlainSolver : public SheetSolver {
     integrator_->start(dynamics_, time, dt, v, motion_);
   }
 
-  void advance(double time, Crew& /*crew*/) override {
+  void advance(double time, ThreadPool& /*pool*/) override {
     integrator_->advance(dynamics_, time, dt_, motion_);
   }
 
-  void lead(int particle, const Vector3d& x, const Vector3d& d) override {
+  void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
     motion_.x.col(particle) = x;
     motion_.d.col(particle) = d;
   }
 
-  void resolve(const Contacts& contacts, Crew& /*crew*/) override {
+  void resolve(const Contacts& contacts, ThreadPool& /*pool*/) override {
     for (Eigen::Index i = 0; i < motion_.x.cols(); ++i) {
       if (dynamics_.inverse_mass[i] == 0) continue;
       Vector3d x = motion_.x.col(i), d = motion_.d.col(i);

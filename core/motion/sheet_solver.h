@@ -7,8 +7,8 @@
 
 #include "core/contact/contact.h"
 #include "core/model/mesh.h"
-#include "core/motion/crew.h"
 #include "core/motion/integrator.h"
+#include "core/motion/thread_pool.h"
 
 namespace weft {
 
@@ -20,17 +20,17 @@ class SheetSolver {
   // Begins, or begins again, from positions (m) and velocities (m/s) at `time`, with steps of dt
   // (s). (3 x particles)
   virtual void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) = 0;
-  // One step of all free particles from `time`; large sheets are shared among the crew.
-  virtual void advance(double time, Crew& crew) = 0;
+  // One step of all free particles from `time`; large sheets are shared among the pool.
+  virtual void advance(double time, ThreadPool& pool) = 0;
   // Puts a held particle where its path leads it: position and displacement of the step, m.
-  virtual void lead(int particle, const Vector3d& x, const Vector3d& d) = 0;
+  virtual void move_held(int particle, const Vector3d& x, const Vector3d& d) = 0;
   // Moves free particles out of colliders.
-  virtual void resolve(const Contacts& contacts, Crew& crew) = 0;
+  virtual void resolve(const Contacts& contacts, ThreadPool& pool) = 0;
 
-  // More than these have nothing to do in a crew.
-  virtual int most_hands() const { return 1; }
+  // More than these have nothing to do in a pool.
+  virtual int most_threads() const { return 1; }
   // Lets go of memory that only steps need, until the next one.
-  virtual void pack() {}
+  virtual void release_memory() {}
 
   // Present state: m, m/s.
   virtual void positions(Matrix3Xd& x) const = 0;

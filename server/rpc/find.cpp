@@ -81,10 +81,10 @@ void adopt_session(Backend& backend, const std::string& id) {
   find_elsewhere(backend, admin, session_name(id), [](const FoundSession&) {});
 }
 
-void retire_sessions(Backend& backend, std::chrono::duration<double> unused) {
+void evict_sessions(Backend& backend, std::chrono::duration<double> unused) {
   for (const auto& session : backend.registry.list("", std::numeric_limits<std::size_t>::max())) {
     const std::lock_guard one_at_a_time(backend.claiming);
-    if (!session->retire(unused)) continue;
+    if (!session->evict(unused)) continue;
     try {
       backend.store->let_go(session->identity());
     } catch (const StoreError& error) {

@@ -38,6 +38,6 @@ void adopt_session(Backend& backend, const std::string& id);
 void give_away(Backend& backend, const std::shared_ptr<Session>& session);
 
 // Leaves sessions that are paused and were not used for so long to the store alone.
-void retire_sessions(Backend& backend, std::chrono::duration<double> unused);
+void evict_sessions(Backend& backend, std::chrono::duration<double> unused);
 
 }  // namespace weft

@@ -152,7 +152,7 @@ grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext
                                                      v1::Session* response) {
   return on_session(backend_, context, request->name(),
                     [this, response](const Asked& asked, UnaryCall& call) {
-                      asked.session->attend();
+                      asked.session->keep_awake();
                       *response = to_proto(*asked.session);
                       response->set_replica(backend_.replica);
                       call.Finish(grpc::Status::OK);

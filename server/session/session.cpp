@@ -10,7 +10,7 @@
 #include <set>
 #include <sstream>
 
-#include "server/session/frame_crew.h"
+#include "server/session/idle_threads.h"
 
 namespace weft {
 namespace {
@@ -107,10 +107,10 @@ SessionStatus Session::status() const {
   return {state_, history_.latest(), textiles_, plan_, repairs_, failure_, lateness_};
 }
 
-void Session::attend() {
+void Session::keep_awake() {
   {
     std::lock_guard lock(mutex_);
-    attended_ = used_ = Clock::now();
+    looked_at_ = used_ = Clock::now();
     if (!release()) return;
   }
   wake();
@@ -136,7 +136,7 @@ void Session::submit(Command command) {
   }
 }
 
-bool Session::retire(std::chrono::duration<double> unused) {
+bool Session::evict(std::chrono::duration<double> unused) {
   std::lock_guard lock(mutex_);
   const bool busy = closed_ || state_ != SessionState::kPaused || !commands_.empty() ||
                     !steps_.empty() || !subscriptions_.empty() || past_holders_ || writing_.then ||
@@ -685,10 +685,10 @@ FramePart Session::advance_frame() {
     const auto time = Clock::now() - begin;
     return time >= kSlice || (time >= kBusySlice && scheduler_.busy());
   };
-  const int most_hands = simulation_.most_hands();
-  if (most_hands == 1) return simulation_.advance_frame(enough);
-  FrameCrew crew(scheduler_, most_hands);
-  return simulation_.advance_frame(enough, crew);
+  const int most_threads = simulation_.most_threads();
+  if (most_threads == 1) return simulation_.advance_frame(enough);
+  IdleThreads pool(scheduler_, most_threads);
+  return simulation_.advance_frame(enough, pool);
 }
 
 // Those that the last frame took, which are published with it.
@@ -716,7 +716,7 @@ std::vector<Repair> Session::take_repairs() {
 // When the next frame is to be computed; nullopt: not before something happens.
 std::optional<Clock::time_point> Session::next_due() {
   const auto due = due_time();
-  if (!due && idle()) simulation_.pack();
+  if (!due && idle()) simulation_.release_memory();
   return due;
 }
 
@@ -767,7 +767,7 @@ std::shared_ptr<const Frame> Session::make_frame(std::vector<Repair> repairs) co
 // Whether the frames to come are all like the last one, without a goal and with nobody to see them.
 bool Session::unattended() const {
   return simulation_.asleep() && recorders() == 0 && !steps_begun() && !run_->until_frame &&
-         Clock::now() > attended_ + kAttention;
+         Clock::now() > looked_at_ + kAwakeTime;
 }
 
 // While it is restored it shows nothing else, but a failure.

@@ -96,7 +96,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   // Answers that are remembered, for those who send a named request again.
   static constexpr std::size_t kMaxAnswers = 1000;
   // How long a session that sleeps without a goal and a stream goes on after somebody looked.
-  static constexpr std::chrono::seconds kAttention{2};
+  static constexpr std::chrono::seconds kAwakeTime{2};
   // How long a session that was restored waits for subscribers that it had held frames for, and may
   // be restored again with the frames that subscribers had.
   static constexpr std::chrono::seconds kHoldAfterRestore{30};
@@ -126,8 +126,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
 
   void submit(Command command);
 
-  // Somebody looks: one that sleeps goes on for kAttention, also without a goal and a stream.
-  void attend();
+  // Somebody looks: one that sleeps goes on for kAwakeTime, also without a goal and a stream.
+  void keep_awake();
 
   // One for a stream to act with. What is in it when a session is restored is let go.
   int new_hand() { return ++hands_; }
@@ -141,7 +141,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
 
   // Ends it as one that is with no server now, where it is paused and was not used for so long;
   // false where it is not so.
-  [[nodiscard]] bool retire(std::chrono::duration<double> unused);
+  [[nodiscard]] bool evict(std::chrono::duration<double> unused);
 
   // Ends it: refuses every command, waiting and to come, with `why`, and ends subscriptions.
   void close(Refusal::Why why);
@@ -298,7 +298,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   History history_;
   std::vector<Subscription*> subscriptions_;
   bool held_ = false;  // idle until somebody comes, or a subscriber reads on
-  Clock::time_point attended_;
+  Clock::time_point looked_at_;
   Clock::time_point used_ = Clock::now();  // a call, a frame, the end of a stream
   std::vector<NamedSnapshot> named_;       // in order of frame
   Writing writing_;

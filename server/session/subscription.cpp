@@ -46,7 +46,7 @@ void Session::unsubscribe(const Subscription& subscription) {
     std::lock_guard lock(mutex_);
     std::erase(subscriptions_, &subscription);
     used_ = Clock::now();
-    if (subscription.policy_ != SlowReader::kSkip) attended_ = Clock::now();
+    if (subscription.policy_ != SlowReader::kSkip) looked_at_ = Clock::now();
     release();
   }
   wake();

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/session/frame_crew.h"
+#include "server/session/idle_threads.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft {
@@ -57,14 +57,14 @@ void advance(benchmark::State& state, const Case& given, std::optional<Simulatio
   }
   Simulation& simulation = *kept;
   Scheduler scheduler(given.threads - 1);
-  std::optional<FrameCrew> crew;
+  std::optional<IdleThreads> pool;
   do {
-    crew.emplace(scheduler, given.threads);
+    pool.emplace(scheduler, given.threads);
     for (int frame = 0; frame < (given.rows > 317 ? 1 : 5); ++frame)
-      if (!simulation.advance_frame(*crew)) std::abort();
-  } while (crew->hands() < given.threads);
+      if (!simulation.advance_frame(*pool)) std::abort();
+  } while (pool->threads() < given.threads);
   for (auto _ : state)
-    if (!simulation.advance_frame(*crew)) state.SkipWithError("diverged");
+    if (!simulation.advance_frame(*pool)) state.SkipWithError("diverged");
   state.SetItemsProcessed(state.iterations() * simulation.plan().step.substeps *
                           simulation.particle_count());
   hwy::SetSupportedTargetsForTest(0);
@@ -89,7 +89,7 @@ void hold(benchmark::State& state, int rows) {
     for (int i = 0; i < kCount; ++i)
       if (!simulations.emplace_back(scene).advance_frame()) std::abort();
     state.counters["bytes"] = (used() - before) / kCount;
-    for (Simulation& simulation : simulations) simulation.pack();
+    for (Simulation& simulation : simulations) simulation.release_memory();
     state.counters["bytes_packed"] = (used() - before) / kCount;
   }
 }

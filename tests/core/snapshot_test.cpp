@@ -147,9 +147,9 @@ TEST_P(SnapshotOf, ASimulationPackedBetweenFramesIsThatOfOneThatWasNot) {
       ASSERT_FALSE(packed.set_textile(0, textile));
       ASSERT_FALSE(other.set_textile(0, textile));
     }
-    packed.pack();
+    packed.release_memory();
     expect_same(packed, other);
-    packed.pack();
+    packed.release_memory();
     advance(packed, 1);
     advance(other, 1);
   }
@@ -184,7 +184,7 @@ TEST_P(SnapshotOf, FramesInPartsAreThoseInOneGoAlsoWhereSomeAreDroppedOnTheWay) 
       if (done) break;
       EXPECT_GT(in_parts.frame_share(), 0);
       EXPECT_LT(in_parts.frame_share(), 1);
-      in_parts.pack();
+      in_parts.release_memory();
       if (drops > 3 * frame + 2 || !in_parts.drop_frame()) continue;
       ++drops;
       EXPECT_EQ(in_parts.frame_share(), 0);

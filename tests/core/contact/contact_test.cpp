@@ -7,8 +7,8 @@
 #include <numbers>
 #include <random>
 
-#include "core/motion/lattice_contact.h"
-#include "core/motion/lattice_law.h"
+#include "core/lattice/contact.h"
+#include "core/lattice/law.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::testing {

@@ -90,7 +90,7 @@ TEST(Guard, EqualScenesAreRepairedToTheSameBits) {
   scene.solver.allow_unstable = true;
   Simulation one(scene), other(scene);
   for (int frame = 0; frame < 20; ++frame) {
-    other.pack();
+    other.release_memory();
     ASSERT_TRUE(one.advance_frame());
     ASSERT_TRUE(other.advance_frame());
   }
@@ -118,7 +118,7 @@ TEST(Guard, AStrainThatAShorterStepConfirmsIsNoReasonForARepair) {
   Simulation simulation(floating(sheet)), packed(floating(sheet));
   const double planned = simulation.plan().step.substep;
   for (int frame = 0; frame < 20; ++frame) {
-    packed.pack();
+    packed.release_memory();
     ASSERT_TRUE(simulation.advance_frame());
     ASSERT_TRUE(packed.advance_frame());
     EXPECT_EQ(velocities(packed), velocities(simulation));

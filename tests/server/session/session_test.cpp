@@ -139,7 +139,7 @@ TEST(Session, AsleepGoesOnAsLongAsSomebodyLooks) {
   while (!is_idle(scheduler, *session)) {
   }
   const std::int64_t frame = session->status().newest->number;
-  while (session->status().newest->number < frame + 100) session->attend();
+  while (session->status().newest->number < frame + 100) session->keep_awake();
   EXPECT_EQ(session->status().newest->substeps, 0);
 }
 

@@ -18,20 +18,22 @@ class FaultySolver : public SheetSolver {
     struck_ = false;
     solver_->start(x, v, time, dt);
   }
-  void advance(double time, Crew& crew) override {
-    solver_->advance(time, crew);
+  void advance(double time, ThreadPool& pool) override {
+    solver_->advance(time, pool);
     if (time < from_ || *times_ == 0 || std::exchange(struck_, true)) return;
     --*times_;
     Matrix3Xd x;
     solver_->positions(x);
     const auto middle = static_cast<int>(x.cols() / 2);
     const Vector3d jump(0, jump_, 0);
-    solver_->lead(middle, x.col(middle) + jump, jump);
+    solver_->move_held(middle, x.col(middle) + jump, jump);
   }
-  void lead(int particle, const Vector3d& x, const Vector3d& d) override {
-    solver_->lead(particle, x, d);
+  void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
+    solver_->move_held(particle, x, d);
   }
-  void resolve(const Contacts& contacts, Crew& crew) override { solver_->resolve(contacts, crew); }
+  void resolve(const Contacts& contacts, ThreadPool& pool) override {
+    solver_->resolve(contacts, pool);
+  }
   void positions(Matrix3Xd& x) const override { solver_->positions(x); }
   void velocities(Matrix3Xd& v) const override { solver_->velocities(v); }
   void closing_velocities(double time, Matrix3Xd& v) const override {

@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "core/contact/contact.h"
-#include "core/motion/lattice_law.h"
+#include "core/lattice/law.h"
 #include "tests/support/core/scenes.h"
 
 // The vector kernels are held to the plain solver, which evaluates one connection after the other.
@@ -174,10 +174,10 @@ void fill_with_nan(SweepState<T>& state, const LatticeLayout<T>& layout) {
         state.place(r, c)[plane] = std::numeric_limits<T>::quiet_NaN();
 }
 
-// Three hands that begin at the end.
-class BackwardCrew : public Crew {
+// Three threads that begin at the end.
+class BackwardCrew : public ThreadPool {
  public:
-  int hands() const override { return 3; }
+  int threads() const override { return 3; }
   void run(int parts, const std::function<void(int)>& part) override {
     for (int i = parts - 1; i >= 0; --i) part(i);
   }
@@ -192,12 +192,12 @@ std::vector<T> swept(const SheetDefinition& sheet, bool poisoned, int bands = 1)
   law.drift = {0, T(-1e-7), 0};
   law.wind = {true, {T(2), T(-1), T(4)}, T(1 / 6e-4), T(0.1), T(0.01)};
   State state(law.layout, law.compensated);
-  BackwardCrew crew;
+  BackwardCrew pool;
   if (poisoned) fill_with_nan(state, law.layout);
   const Matrix3Xd x = start_positions(sheet) + 0.01 * noise(sheet.particle_count());
   std::vector<T> out;
   for (int step = -1; step < 3; ++step) {
-    if (step >= 0) sweep(law, state, bands, crew);
+    if (step >= 0) sweep(law, state, bands, pool);
     for (int i = 0; i < sheet.particle_count(); ++i) {
       const int r = i / sheet.grid.columns, c = i % sheet.grid.columns;
       for (int axis = 0; axis < 3 && step < 0; ++axis)
@@ -286,11 +286,11 @@ TEST(Repeatability, RunsHaveTheSameBitsHoweverManyHandsShareThem) {
   Scene scene = crumpled(flat_sheet(96, 130));
   scene.colliders = {{"ball", Sphere{Vector3d(0.4, -0.2, 0.4), 0.2}, 0.3, {}}};
   Simulation alone(scene), shared(scene);
-  EXPECT_EQ(shared.most_hands(), 3);
-  BackwardCrew crew;
+  EXPECT_EQ(shared.most_threads(), 3);
+  BackwardCrew pool;
   for (int frame = 0; frame < 20; ++frame) {
     ASSERT_TRUE(alone.advance_frame());
-    ASSERT_TRUE(shared.advance_frame(crew));
+    ASSERT_TRUE(shared.advance_frame(pool));
   }
   EXPECT_EQ(positions(shared), positions(alone));
   EXPECT_EQ(velocities(shared), velocities(alone));

@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/motion/lattice_contact.h"
-#include "core/motion/lattice_law.h"
+#include "core/lattice/contact.h"
+#include "core/lattice/law.h"
 #include "core/motion/saved_values.h"
 #include "core/motion/sheet_solver.h"
 
@@ -54,7 +54,7 @@ class LatticeSolver : public SheetSolver {
     least_gap_ = come_ = 0;
   }
 
-  void advance(double time, Crew& crew) override {
+  void advance(double time, ThreadPool& pool) override {
     Vector3d drift = dynamics_.gravity * (dt_ * dt_);
     if (dynamics_.drag.size() > 0) {
       const double rate = drag_rate();
@@ -66,10 +66,10 @@ class LatticeSolver : public SheetSolver {
       law_.drift[axis] = static_cast<T>(drift[static_cast<Eigen::Index>(axis)]);
       law_.wind.velocity[axis] = static_cast<T>(air[static_cast<Eigen::Index>(axis)]);
     }
-    moved_ = sweep(law_, state_, bands(crew), crew);
+    moved_ = sweep(law_, state_, bands(pool), pool);
   }
 
-  void lead(int particle, const Vector3d& x, const Vector3d& d) override {
+  void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
     const Place at = state_.place(particle / columns_, particle % columns_);
     set_position(at, x);
     for (int axis = 0; axis < 3; ++axis)
@@ -78,7 +78,7 @@ class LatticeSolver : public SheetSolver {
   }
 
   // A row is looked at again when it, or a collider, may have come as far as its gap was wide.
-  void resolve(const Contacts& contacts, Crew& crew) override {
+  void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
     constexpr double kRounding = 1.001;
     come_ += kRounding * (moved_ + contacts.reach());
@@ -90,7 +90,7 @@ class LatticeSolver : public SheetSolver {
 
     const bool in_parts = contacts.may_cross(moved_);
     const int count = static_cast<int>(near_.size());
-    const int parts = std::clamp(count, 1, bands(crew));
+    const int parts = std::clamp(count, 1, bands(pool));
     const auto resolve_part = [&](int part) {
       for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
         const int r = near_[static_cast<std::size_t>(i)];
@@ -102,17 +102,17 @@ class LatticeSolver : public SheetSolver {
     if (parts == 1)
       resolve_part(0);
     else
-      crew.run(parts, resolve_part);
+      pool.run(parts, resolve_part);
     least_gap_ = *std::min_element(gap_.begin(), gap_.end());
   }
 
   // Smaller bands cost more to share than they take.
-  int most_hands() const override {
+  int most_threads() const override {
     constexpr int kParticles = 4096, kRows = 16;
     return std::max(1, std::min(particles_ / kParticles, law_.layout.rows / kRows));
   }
 
-  void pack() override { state_.pack(); }
+  void release_memory() override { state_.release_memory(); }
 
   void positions(Matrix3Xd& x) const override {
     x.resize(3, particles_);
@@ -174,7 +174,7 @@ class LatticeSolver : public SheetSolver {
   // What planes are saved.
   int kind() const { return 16 * state_.planes() + static_cast<int>(sizeof(T)); }
 
-  int bands(const Crew& crew) const { return std::min(crew.hands(), most_hands()); }
+  int bands(const ThreadPool& pool) const { return std::min(pool.threads(), most_threads()); }
 
   using Place = typename State::Place;
   using ConstPlace = typename State::ConstPlace;

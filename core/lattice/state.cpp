@@ -1,4 +1,4 @@
-#include "core/motion/lattice_state.h"
+#include "core/lattice/state.h"
 
 #include <sys/mman.h>
 
@@ -58,7 +58,7 @@ void SweepState<T>::set_halo(int halo) {
 }
 
 template <class T>
-void SweepState<T>::pack() {
+void SweepState<T>::release_memory() {
   bands_.clear();
   try {
     set_halo(0);

@@ -1,7 +1,7 @@
 #pragma once
 
+#include "core/lattice/sweep.h"
 #include "core/model/mesh.h"
-#include "core/motion/lattice_sweep.h"
 
 namespace weft {
 

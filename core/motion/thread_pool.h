@@ -4,17 +4,17 @@
 
 namespace weft {
 
-// Hands that share the work of a step. What they make does not depend on how many they are.
-class Crew {
+// Threads that share the work of a step. The result does not depend on how many they are.
+class ThreadPool {
  public:
-  virtual ~Crew() = default;
+  virtual ~ThreadPool() = default;
   // How many may work now, at least 1.
-  virtual int hands() const = 0;
+  virtual int threads() const = 0;
   // Runs part(0) ... part(parts - 1), perhaps at the same time, and returns when all have returned.
   virtual void run(int parts, const std::function<void(int)>& part) = 0;
 };
 
 // The thread that calls, alone.
-Crew& no_crew();
+ThreadPool& calling_thread();
 
 }  // namespace weft

@@ -1,4 +1,4 @@
-#include "server/session/frame_crew.h"
+#include "server/session/idle_threads.h"
 
 #include <gmock/gmock.h>
 
@@ -19,31 +19,31 @@ namespace {
 using namespace std::chrono_literals;
 
 // With every thread of the scheduler in it.
-std::unique_ptr<FrameCrew> full_crew(Scheduler& scheduler, int hands) {
+std::unique_ptr<IdleThreads> all_threads(Scheduler& scheduler, int threads) {
   for (auto patience = 1ms;; patience = std::min(2 * patience, 64ms)) {
     // its threads may be busy, or slow to come
-    auto crew = std::make_unique<FrameCrew>(scheduler, hands);
+    auto pool = std::make_unique<IdleThreads>(scheduler, threads);
     const auto end = Clock::now() + patience;
     while (Clock::now() < end) {
-      if (crew->hands() == hands) return crew;
+      if (pool->threads() == threads) return pool;
       std::this_thread::yield();
     }
-    crew.reset();
+    pool.reset();
     std::this_thread::sleep_for(patience);  // while they leave it: no new one gets them before
   }
 }
 
-TEST(FrameCrew, RunsEveryPartOnce) {
+TEST(IdleThreads, RunsEveryPartOnce) {
   Scheduler scheduler(2);
-  const auto crew = full_crew(scheduler, 3);
+  const auto pool = all_threads(scheduler, 3);
   for (int round = 0; round < 100; ++round) {
     std::vector<int> runs(8);
-    crew->run(8, [&](int part) { ++runs[static_cast<std::size_t>(part)]; });
+    pool->run(8, [&](int part) { ++runs[static_cast<std::size_t>(part)]; });
     ASSERT_THAT(runs, ::testing::Each(1)) << round;
   }
 }
 
-TEST(FrameCrew, TakesNoThreadThatHasSomethingToDo) {
+TEST(IdleThreads, TakesNoThreadThatHasSomethingToDo) {
   std::promise<void> begun, end;
   Scheduler scheduler(1);
   ASSERT_TRUE(scheduler.post([&] {
@@ -55,13 +55,13 @@ TEST(FrameCrew, TakesNoThreadThatHasSomethingToDo) {
   end.set_value();
 }
 
-TEST(FrameCrew, LeavesWhenSomethingElseWaits) {
+TEST(IdleThreads, LeavesWhenSomethingElseWaits) {
   std::promise<void> done;
   Scheduler scheduler(1);
-  const auto crew = full_crew(scheduler, 2);
+  const auto pool = all_threads(scheduler, 2);
   ASSERT_TRUE(scheduler.post([&] { done.set_value(); }));
   done.get_future().wait();
-  EXPECT_EQ(crew->hands(), 1);
+  EXPECT_EQ(pool->threads(), 1);
 }
 
 // Waits for a time, once.
@@ -80,22 +80,22 @@ class Waits : public Task {
   std::optional<Clock::time_point> due_;
 };
 
-TEST(FrameCrew, LeavesForATaskWhoseTimeHasCome) {
+TEST(IdleThreads, LeavesForATaskWhoseTimeHasCome) {
   std::promise<void> done;
   Scheduler scheduler(1);
   scheduler.wake(std::make_shared<Waits>(done));
-  const auto crew = full_crew(scheduler, 2);
+  const auto pool = all_threads(scheduler, 2);
   done.get_future().wait();
 }
 
-TEST(FrameCrew, DoesNotChangeTheFramesOfALargeSheet) {
+TEST(IdleThreads, DoesNotChangeTheFramesOfALargeSheet) {
   SheetDefinition sheet = flat_sheet(64, 130);
   sheet.pins = {{{0, 129}, {}}};
   Scene scene = floating(sheet);
   scene.environment.gravity = {0, -9.8, 0};
   scene.solver.frame_step = 1e-3;
   Simulation alone(scene);
-  ASSERT_GT(alone.most_hands(), 1);
+  ASSERT_GT(alone.most_threads(), 1);
 
   Scheduler scheduler(3);
   const auto session = make_session(scheduler, scene);

@@ -1,4 +1,4 @@
-#include "server/session/frame_crew.h"
+#include "server/session/idle_threads.h"
 
 #include <thread>
 
@@ -16,17 +16,18 @@ void spin_until(const Condition& holds) {
 
 }  // namespace
 
-FrameCrew::FrameCrew(Scheduler& scheduler, int most_hands) : shared_(std::make_shared<Shared>()) {
-  for (int hands = 1; hands < most_hands; ++hands) {
+IdleThreads::IdleThreads(Scheduler& scheduler, int most_threads)
+    : shared_(std::make_shared<Shared>()) {
+  for (int threads = 1; threads < most_threads; ++threads) {
     if (!scheduler.help([shared = shared_, &scheduler] { help(*shared, scheduler); })) break;
   }
 }
 
-FrameCrew::~FrameCrew() { shared_->closed = true; }
+IdleThreads::~IdleThreads() { shared_->closed = true; }
 
-int FrameCrew::hands() const { return 1 + shared_->helpers.load(std::memory_order_relaxed); }
+int IdleThreads::threads() const { return 1 + shared_->helpers.load(std::memory_order_relaxed); }
 
-void FrameCrew::run(int parts, const std::function<void(int)>& part) {
+void IdleThreads::run(int parts, const std::function<void(int)>& part) {
   shared_->part = &part;
   shared_->done.store(0, std::memory_order_relaxed);
   shared_->left.store(parts, std::memory_order_release);
@@ -36,7 +37,7 @@ void FrameCrew::run(int parts, const std::function<void(int)>& part) {
 }
 
 // Runs a part that nobody has taken; false where there is none.
-bool FrameCrew::Shared::take() {
+bool IdleThreads::Shared::take() {
   const int taken = left.fetch_sub(1, std::memory_order_acq_rel);
   if (taken <= 0) return false;
   (*part)(taken - 1);
@@ -44,7 +45,7 @@ bool FrameCrew::Shared::take() {
   return true;
 }
 
-void FrameCrew::help(Shared& shared, const Scheduler& scheduler) {
+void IdleThreads::help(Shared& shared, const Scheduler& scheduler) {
   ++shared.helpers;
   for (bool wanted = true; wanted;) {
     spin_until([&] {

@@ -3,8 +3,8 @@
 #include <array>
 #include <vector>
 
-#include "core/motion/crew.h"
-#include "core/motion/lattice_state.h"
+#include "core/lattice/state.h"
+#include "core/motion/thread_pool.h"
 
 namespace weft {
 
@@ -95,6 +95,6 @@ struct SweepLaw {
 // once, forces and motion while they are in cache. Equal bits on every processor with FMA, and for
 // every number of bands. Returns the largest displacement where law.measured, m.
 template <class T>
-T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, Crew& crew);
+T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, ThreadPool& pool);
 
 }  // namespace weft

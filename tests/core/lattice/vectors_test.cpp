@@ -6,11 +6,11 @@
 
 // compiled again for every target
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "tests/core/motion/lattice_vectors_test.cpp"
+#define HWY_TARGET_INCLUDE "tests/core/lattice/vectors_test.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "core/motion/lattice_vectors-inl.h"
+#include "core/lattice/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace weft::HWY_NAMESPACE {

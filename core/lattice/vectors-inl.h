@@ -12,7 +12,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "core/motion/lattice_sweep.h"
+#include "core/lattice/sweep.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace weft::HWY_NAMESPACE {

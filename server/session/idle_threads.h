@@ -4,21 +4,21 @@
 #include <functional>
 #include <memory>
 
-#include "core/motion/crew.h"
+#include "core/motion/thread_pool.h"
 #include "server/session/scheduler.h"
 
 namespace weft {
 
 // Threads of a scheduler that have nothing else to do while a frame is computed. They leave as soon
 // as something else waits.
-class FrameCrew : public Crew {
+class IdleThreads : public ThreadPool {
  public:
-  FrameCrew(Scheduler& scheduler, int most_hands);
-  ~FrameCrew() override;
-  FrameCrew(const FrameCrew&) = delete;
-  FrameCrew& operator=(const FrameCrew&) = delete;
+  IdleThreads(Scheduler& scheduler, int most_threads);
+  ~IdleThreads() override;
+  IdleThreads(const IdleThreads&) = delete;
+  IdleThreads& operator=(const IdleThreads&) = delete;
 
-  int hands() const override;
+  int threads() const override;
   void run(int parts, const std::function<void(int)>& part) override;
 
  private:

@@ -1,4 +1,4 @@
-#include "core/motion/lattice_law.h"
+#include "core/lattice/law.h"
 
 #include <algorithm>
 #include <cmath>

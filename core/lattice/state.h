@@ -106,7 +106,7 @@ class SweepState {
   }
 
   // Lets go of what only sweeps need, until the next is prepared.
-  void pack();
+  void release_memory();
   // Divides the sheet as it is now into so many bands, which may be swept at the same time.
   std::vector<SweepBand<T>>& divide(int bands);
   // What a band sees of row r, first - 2 <= r < last + 2.

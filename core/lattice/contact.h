@@ -1,7 +1,7 @@
 #pragma once
 
 #include "core/contact/contact.h"
-#include "core/motion/lattice_state.h"
+#include "core/lattice/state.h"
 
 namespace weft {
 

@@ -1,14 +1,14 @@
-#include "core/motion/lattice_contact.h"
+#include "core/lattice/contact.h"
 
 #include <limits>
 
 // compiled again for every target
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "core/motion/lattice_contact.cpp"
+#define HWY_TARGET_INCLUDE "core/lattice/contact.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "core/motion/lattice_vectors-inl.h"
+#include "core/lattice/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace weft::HWY_NAMESPACE {

@@ -1,15 +1,15 @@
-#include "core/motion/lattice_sweep.h"
+#include "core/lattice/sweep.h"
 
 #include <algorithm>
 #include <cmath>
 
 // compiled again for every target
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "core/motion/lattice_sweep.cpp"
+#define HWY_TARGET_INCLUDE "core/lattice/sweep.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "core/motion/lattice_vectors-inl.h"
+#include "core/lattice/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace weft::HWY_NAMESPACE {
@@ -608,10 +608,10 @@ double sweep_band(const SweepLaw<double>& law, SweepState<double>& state, SweepB
 }  // namespace
 
 template <class T>
-T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, Crew& crew) {
+T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, ThreadPool& pool) {
   std::vector<SweepBand<T>>& divided = state.divide(bands);
   if (bands == 1) return sweep_band(law, state, divided.front());
-  crew.run(bands, [&](int i) {
+  pool.run(bands, [&](int i) {
     SweepBand<T>& band = divided[static_cast<std::size_t>(i)];
     band.farthest = sweep_band(law, state, band);
   });
@@ -620,8 +620,8 @@ T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, Crew& crew) {
   return farthest;
 }
 
-template float sweep(const SweepLaw<float>&, SweepState<float>&, int, Crew&);
-template double sweep(const SweepLaw<double>&, SweepState<double>&, int, Crew&);
+template float sweep(const SweepLaw<float>&, SweepState<float>&, int, ThreadPool&);
+template double sweep(const SweepLaw<double>&, SweepState<double>&, int, ThreadPool&);
 
 }  // namespace weft
 #endif

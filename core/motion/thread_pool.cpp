@@ -1,11 +1,11 @@
-#include "core/motion/crew.h"
+#include "core/motion/thread_pool.h"
 
 namespace weft {
 namespace {
 
-class NoCrew : public Crew {
+class CallingThread : public ThreadPool {
  public:
-  int hands() const override { return 1; }
+  int threads() const override { return 1; }
   void run(int parts, const std::function<void(int)>& part) override {
     for (int i = 0; i < parts; ++i) part(i);
   }
@@ -13,8 +13,8 @@ class NoCrew : public Crew {
 
 }  // namespace
 
-Crew& no_crew() {
-  static NoCrew alone;
+ThreadPool& calling_thread() {
+  static CallingThread alone;
   return alone;
 }
 

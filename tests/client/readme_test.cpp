@@ -2,14 +2,15 @@
 
 #include "tests/client/client_test.h"
 
-// What the README shows, and what depends on how frames are computed.
+// What the READMEs show, and what depends on how frames are computed.
 namespace weft::testing {
 namespace {
 
 using ::testing::HasSubstr;
 
 TEST(Readme, ShowsWhatItsCommandsAnswer) {
-  const std::string readme = read_file(WEFT_TEST_DATA_DIR "/../../README.md");
+  const std::string root = WEFT_TEST_DATA_DIR "/../../";
+  const std::string readme = read_file(root + "README.md") + read_file(root + "client/README.md");
   const TemporaryDirectory directory;
   const std::string scene = directory.path("scene.json"), file = directory.path("again.weft");
   const auto answer = [](const std::vector<std::string>& arguments) {

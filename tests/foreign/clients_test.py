@@ -270,7 +270,7 @@ class Weftd(unittest.TestCase):
     def test_the_readme_s_reader_prints_every_frame(self):
         reader = pathlib.Path(__file__).parent / "read_frames.py"
         shown = reader.read_text().replace("\n", "\n    ").replace("\n    \n", "\n\n").rstrip()
-        self.assertIn(shown, (reader.parents[2] / "README.md").read_text())
+        self.assertIn(shown, (reader.parents[2] / "client" / "README.md").read_text())
         with tempfile.NamedTemporaryFile("w", suffix=".json") as scene:
             scene.write(self.scene_text)
             scene.flush()

@@ -20,6 +20,10 @@ std::string Context::session_name(const std::string& session) {
 }
 
 std::string Context::session_or_scene(const std::string& given) {
+  if (!embedded && !server_named && given.ends_with(".json")) {
+    embedded = true;
+    if (!json) terminal.err << "runs within this command: no --server was named\n";
+  }
   return embedded ? create_session(connection(), read_scene(given)).name() : session_name(given);
 }
 

@@ -20,6 +20,7 @@ class Context {
   std::stop_token stop;
   std::string server = kDefaultServer;
   Credentials credentials;
+  bool server_named = false;  // by an option, or the environment
   bool embedded = false;
   bool json = false;
 
@@ -27,7 +28,10 @@ class Context {
   Connection& connection();
   // "sessions/flag" of "flag". Refused where the server is our own: it has no sessions yet.
   std::string session_name(const std::string& session);
-  // The same, but where the server is our own, the session made from that scene file.
+  // For what a server of our own does as well as any: unless one was named, ours.
+  void prefer_embedded() { embedded = embedded || !server_named; }
+  // The same, but where the server is our own, the session made from that scene file. A JSON file,
+  // where no server was named, has one of its own.
   std::string session_or_scene(const std::string& given);
 
   // Prints the answer: the document for scripts, the text for people.

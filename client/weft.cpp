@@ -26,7 +26,8 @@ A first run:
   weft export drape.weft --format obj -o drape
 
 With --embedded no server is needed: it lives within the command, and SESSION is
-a scene file. With --json every answer is one JSON document (watch: one a line),
+a scene file; so it is where a scene file is given and no --server (WEFT_SERVER)
+is named, as for scene check, textile list and show, and lab. With --json every answer is one JSON document (watch: one a line),
 on stderr {"error": ...}. Exit codes: weft help errors.)";
 
 std::string problem_text(const Problem& problem) {
@@ -111,10 +112,11 @@ int report(const Problem& problem, const Context& context) {
 }
 
 void add_options(CLI::App& app, Context& context) {
-  app.add_option("--server", context.server, "Address of weftd")
-      ->type_name("ADDRESS")
-      ->envname("WEFT_SERVER")
-      ->capture_default_str();
+  CLI::Option* server = app.add_option("--server", context.server, "Address of weftd")
+                            ->type_name("ADDRESS")
+                            ->envname("WEFT_SERVER")
+                            ->capture_default_str();
+  app.parse_complete_callback([server, &context] { context.server_named = server->count() > 0; });
   Credentials& own = context.credentials;
   if (const char* token = std::getenv("WEFT_TOKEN")) own.token = token;
   const auto file = [&](const char* flag, std::string& path, const char* variable,

@@ -57,7 +57,7 @@ void add_session_argument(CLI::App& command, std::string& session) {
 }
 
 void add_session_or_scene_argument(CLI::App& command, std::string& given) {
-  command.add_option("SESSION", given, "Name of the session (with --embedded: a scene file)")
+  command.add_option("SESSION", given, "Name of the session, or a scene file (see --embedded)")
       ->option_text(" ")
       ->required();
 }

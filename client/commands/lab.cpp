@@ -55,6 +55,7 @@ v1::RunTestRequest request_of(const LabOptions& options) {
 
 // The report, with a bar while it is being made.
 v1::LabReport report_of(Context& context, const v1::RunTestRequest& request) {
+  context.prefer_embedded();
   Connection& connection = context.connection();
   grpc::ClientContext call;
   const std::stop_callback cancel(context.stop, [&] { call.TryCancel(); });

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "client/commands/commands.h"
 #include "client/exports/output_file.h"
 #include "client/output/text.h"
@@ -12,6 +14,7 @@ namespace {
 struct NewOptions {
   std::string name;
   std::string path;
+  bool replace = false;
   TemplateOptions values;
 };
 
@@ -21,6 +24,8 @@ void run_new(Context& context, const NewOptions& options) {
     context.terminal.out << scene_text(scene) << std::flush;
     return;
   }
+  if (!options.replace && std::filesystem::exists(options.path))
+    throw unwritable(options.path, "the file exists; --force replaces it");
   OutputFile file(options.path);
   file.write(scene_text(scene));
   file.close();
@@ -30,6 +35,7 @@ void run_new(Context& context, const NewOptions& options) {
 void run_check(Context& context, const std::string& path) {
   v1::CreateSessionRequest request;
   request.set_validate_only(true);
+  context.prefer_embedded();
   const v1::Session session = create_session(context.connection(), read_scene(path), request);
 
   std::int64_t particles = 0;
@@ -69,6 +75,7 @@ void add_new(CLI::App& scene, Context& context) {
       ->required();
   command->add_option("-o,--output", options->path, "Scene file to write; else it goes to stdout")
       ->type_name("FILE");
+  command->add_flag("--force", options->replace, "Replace a file that exists");
   command->add_option("--rows", values.rows, "Particles along z")->type_name("N");
   command->add_option("--columns", values.columns, "Particles along x")->type_name("N");
   command->add_option("--spacing", values.spacing_m, "Distance between neighbours, m")

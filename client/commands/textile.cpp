@@ -13,6 +13,7 @@ namespace {
 using google::protobuf::FieldDescriptor;
 
 void list_textiles(Context& context) {
+  context.prefer_embedded();
   const auto all = context.connection().call(&Textiles::ListTextiles, v1::ListTextilesRequest());
   Table table({"NAME", "TEXTILE", "kg/m^2", "STATUS"});
   for (const auto& textile : all.textiles()) {
@@ -42,6 +43,7 @@ std::string si_text(const v1::MeasuredTextile& values, const std::string& field)
 void run_show(Context& context, const std::string& name) {
   v1::GetTextileRequest request;
   request.set_name(name.starts_with("textiles/") ? name : "textiles/" + name);
+  context.prefer_embedded();
   const v1::TextilePreset textile = context.connection().call(&Textiles::GetTextile, request);
   Facts facts;
   facts.add("textile", textile.display_name())

@@ -196,6 +196,29 @@ TEST_F(CommandsTest, TopShowsTheServerAndItsSessions) {
   EXPECT_THAT(text, HasSubstr("sessions/drape"));
 }
 
+TEST_F(CommandsTest, ASceneFileIsReplacedOnlyWhereAskedTo) {
+  const std::vector<std::string> make = {"scene", "new", "--template",
+                                         "hang",  "-o",  path("hang.json")};
+  EXPECT_EQ(run_weft(make).exit, 0);
+  const Outcome again = run_weft(make);
+  EXPECT_EQ(again.exit, 4);
+  EXPECT_THAT(again.err, ::testing::HasSubstr("--force"));
+  auto forced = make;
+  forced.emplace_back("--force");
+  EXPECT_EQ(run_weft(forced).exit, 0);
+}
+
+TEST_F(CommandsTest, WhereNoServerIsNamedAFileNeedsNone) {
+  const std::string scene = scene_file(small_scene());
+  EXPECT_EQ(run_weft({"scene", "check", scene}).exit, 0);
+  EXPECT_EQ(run_weft({"textile", "show", "denim_11oz"}).exit, 0);
+  const Outcome stepped = run_weft({"step", scene, "--frames", "2"});
+  EXPECT_EQ(stepped.exit, 0) << stepped.err;
+  EXPECT_THAT(stepped.err, ::testing::HasSubstr("no --server was named"));
+  const Outcome named = run_weft({"step", scene, "--server", "127.0.0.1:1"});
+  EXPECT_NE(named.exit, 0) << "a server that is named is meant";
+}
+
 TEST_F(CommandsTest, HelpIsAnAnswer) {
   const Outcome help = weft({"--help"});
   EXPECT_EQ(help.exit, 0);

@@ -18,14 +18,12 @@ TEST(Readme, ShowsWhatItsCommandsAnswer) {
     EXPECT_EQ(outcome.exit, 0) << outcome.err;
     return outcome.out;
   };
-  answer({"scene", "new", "--template", "sphere", "--textile", "wool_tropical", "-o", scene,
-          "--embedded"});
-  const std::string recorded = answer({"record", scene, "--embedded", "--until-rest", "-o", file});
+  answer({"scene", "new", "--template", "sphere", "--textile", "wool_tropical", "-o", scene});
+  const std::string recorded = answer({"record", scene, "--until-rest", "-o", file});
   EXPECT_THAT(readme, HasSubstr(recorded.substr(recorded.find(": "))));
 
   // what it says of the scene and of the recording, but for names, times and sizes
-  std::istringstream lines(answer({"scene", "check", scene, "--embedded"}) +
-                           answer({"info", file}));
+  std::istringstream lines(answer({"scene", "check", scene}) + answer({"info", file}));
   for (std::string line; std::getline(lines, line);) {
     const bool differs = line.starts_with("recorded") || line.starts_with("session") ||
                          line.starts_with("uid") || line.find("scene.json: ") != line.npos ||

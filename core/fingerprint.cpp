@@ -13,7 +13,8 @@ namespace {
 SheetDefinition rough_sheet(const BendingLaw& bending) {
   SheetDefinition sheet;
   sheet.name = "sheet";
-  sheet.grid = {4, 17, 0.01};
+  const Grid grid{4, 17, 0.01};
+  sheet.shape = grid;
   sheet.textile.model = MeasuredTextile{.areal_density = 0.2,
                                         .tensile_warp = 300,
                                         .tensile_weft = 200,
@@ -23,8 +24,8 @@ SheetDefinition rough_sheet(const BendingLaw& bending) {
                                         .air_drag = 0.1};
   sheet.bending = bending;
   std::minstd_rand random;
-  for (int r = 0; r < sheet.grid.rows; ++r)
-    for (int c = 0; c < sheet.grid.columns; ++c)
+  for (int r = 0; r < grid.rows; ++r)
+    for (int c = 0; c < grid.columns; ++c)
       for (const double at : {c * 0.0098, 0.0, r * 0.0098})
         sheet.start_positions.push_back(at + 1e-3 * static_cast<double>(random()) / random.max());
   sheet.pins = {{{0}, {}}};

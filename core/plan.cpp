@@ -8,8 +8,8 @@
 
 #include "core/model/self_weight.h"
 #include "core/model/text.h"
-#include "core/motion/sheet_solver.h"
 #include "core/motion/stability.h"
+#include "core/sheet_factory.h"
 
 namespace weft {
 namespace {
@@ -24,7 +24,7 @@ double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& me
     rate += mesh.drag.cwiseQuotient(mesh.mass).maxCoeff();
   if (scene.environment.wind) {
     const Wind& wind = *scene.environment.wind;
-    const double h = sheet.grid.spacing;
+    const double h = sheet.spacing();
     const double speed = wind.velocity.norm() * (1 + wind.gust);
     rate += (wind.air_density * speed + wind.tangential_drag) * h * h / mesh.mass.minCoeff();
   }
@@ -32,10 +32,10 @@ double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& me
 }
 
 // Of each sheet.
-std::vector<StableStep> stable_steps(const Scene& scene, const std::vector<SheetShape>& shapes) {
+std::vector<StableStep> stable_steps(const Scene& scene, const std::vector<PlannedSheet>& planned) {
   std::vector<StableStep> steps;
-  for (std::size_t s = 0; s < shapes.size(); ++s) {
-    const auto& [mesh, inverse_mass, x] = shapes[s];
+  for (std::size_t s = 0; s < planned.size(); ++s) {
+    const auto& [mesh, inverse_mass, x] = planned[s];
     steps.push_back(stable_step(mesh, inverse_mass, scene.solver.integrator,
                                 air_rate(scene, scene.sheets[s], mesh), x));
   }
@@ -128,7 +128,7 @@ struct Stiffness {
 };
 Stiffness stiffness_of(const SheetDefinition& sheet, double gravity) {
   if (const auto* raw = std::get_if<RawTextile>(&sheet.textile.model)) {
-    const double h = sheet.grid.spacing;
+    const double h = sheet.spacing();
     const std::pair both(1.5 * raw->bend / h, raw->clamp.value_or(raw->stretch));  // k_b = 2/3 B h
     return {raw->particle_mass / (h * h) * gravity, {both, both}};
   }
@@ -179,11 +179,11 @@ void warn_of_bending(const Scene& scene, std::size_t index, const Mesh& mesh, Pl
   const auto limit = bending_limit(scene, sheet, mesh);
   if (!limit) return;
   plan.bending_limits.push_back(*limit);
-  if (sheet.grid.spacing < limit->finest_spacing)
+  if (sheet.spacing() < limit->finest_spacing)
     plan.warnings.push_back(
         {"MESH_TOO_FINE", sheet_path(index) + ".grid.spacing_m",
          join(
-             "a spacing of ", sheet.grid.spacing, " m is below ", limit->finest_spacing,
+             "a spacing of ", sheet.spacing(), " m is below ", limit->finest_spacing,
              " m, under which interlaced connections lose the bending rigidity of this textile: it "
              "will hang too limp. Use a larger spacing or ISOMETRIC")});
 
@@ -234,10 +234,10 @@ void describe_stretch(const Scene& scene, std::size_t index, Plan& plan) {
 }
 
 // Where damping is so low that energy may come from nothing.
-void warn_of_damping(const Scene& scene, const std::vector<SheetShape>& shapes, std::size_t index,
-                     const StableStep& stable, Plan& plan) {
+void warn_of_damping(const Scene& scene, const std::vector<PlannedSheet>& planned,
+                     std::size_t index, const StableStep& stable, Plan& plan) {
   const Textile& textile = scene.sheets[index].textile;
-  const Mesh& mesh = shapes[index].mesh;
+  const Mesh& mesh = planned[index].mesh;
   const double ratio = stable.connection_ratio;
   const std::string field = sheet_path(index) + ".textile";
   constexpr const char* kWhy =
@@ -272,7 +272,7 @@ void warn_of_damping(const Scene& scene, const std::vector<SheetShape>& shapes, 
               kSafeDampingRatio, " would need none of that")});
 }
 
-void warn(const Scene& scene, const std::vector<SheetShape>& shapes,
+void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
           const std::vector<StableStep>& steps, Plan& plan) {
   plan.warnings.push_back({"NO_SELF_COLLISION", "", "a sheet may pass through itself"});
   if (scene.sheets.size() > 1)
@@ -286,10 +286,10 @@ void warn(const Scene& scene, const std::vector<SheetShape>& shapes,
            "cells between them, and cells that are pulled over an edge may stay hooked on it, "
            "stretched by half for good. A finer grid, a larger skin_m or a capsule along the "
            "edge helps"});
-  for (std::size_t s = 0; s < shapes.size(); ++s) {
-    warn_of_bending(scene, s, shapes[s].mesh, plan);
+  for (std::size_t s = 0; s < planned.size(); ++s) {
+    warn_of_bending(scene, s, planned[s].mesh, plan);
     warn_of_tension(scene.sheets[s], s, plan);
-    warn_of_damping(scene, shapes, s, steps[s], plan);
+    warn_of_damping(scene, planned, s, steps[s], plan);
     describe_stretch(scene, s, plan);
   }
   if (plan.step.substep > plan.step.linear_bound)
@@ -308,15 +308,15 @@ std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettin
   return StepRefusal{step.substep, step.linear_bound, !unstable, step.substeps, most_substeps};
 }
 
-Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes) {
+Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
   Plan plan;
-  const std::vector<StableStep> steps = stable_steps(scene, shapes);
+  const std::vector<StableStep> steps = stable_steps(scene, sheets);
   plan.step = plan_step(scene, steps);
-  for (std::size_t s = 0; s < shapes.size(); ++s) {
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
     plan.dampings.push_back(
-        {scene.sheets[s].name, shapes[s].mesh.damping, steps[s].connection_ratio});
+        {scene.sheets[s].name, sheets[s].mesh.damping, steps[s].connection_ratio});
     describe_solver(scene, scene.sheets[s], plan);
-    describe_families(scene.sheets[s], shapes[s].mesh, plan);
+    describe_families(scene.sheets[s], sheets[s].mesh, plan);
     plan.particle_substeps += scene.sheets[s].particle_count() / plan.step.substep;
   }
   const auto pass = [&](const char* name, bool runs, const char* why_not) {
@@ -327,7 +327,7 @@ Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes) {
   };
   pass("wind", scene.environment.wind.has_value(), "the scene has none");
   pass("contact", !scene.colliders.empty(), "the scene has no collider");
-  warn(scene, shapes, steps, plan);
+  warn(scene, sheets, steps, plan);
   return plan;
 }
 

@@ -76,14 +76,14 @@ struct StepRefusal {
 std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver,
                                         std::int64_t most_substeps = kMaxSubsteps);
 
-// A sheet's present shape, as a plan sees it.
-struct SheetShape {
+// What a plan looks at in a sheet.
+struct PlannedSheet {
   const Mesh& mesh;
   const VectorXd& inverse_mass;  // (particles) 1/kg, 0: held
   const Matrix3Xd& x;            // (3 x particles) m
 };
 
-// shapes: those of scene.sheets, in order.
-Plan make_plan(const Scene& scene, const std::vector<SheetShape>& shapes);
+// sheets: those of the scene, in order.
+Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets);
 
 }  // namespace weft

@@ -11,6 +11,7 @@
 #include "core/model/scene.h"
 #include "core/motion/thread_pool.h"
 #include "core/plan.h"
+#include "core/sheet_factory.h"
 #include "core/snapshot.h"
 
 namespace weft {
@@ -25,16 +26,6 @@ struct FrameStats {
 enum class FramePart { kDone, kUnfinished, kFailed };
 // Whether a part is long enough.
 using Enough = std::function<bool()>;
-
-class SheetSolver;
-struct Dynamics;
-// Makes what moves a sheet; `dynamics` outlives it.
-using SolverFactory = std::function<std::unique_ptr<SheetSolver>(
-    const Scene& scene, const SheetDefinition& sheet, const Dynamics& dynamics)>;
-
-// The fastest that can.
-std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefinition& sheet,
-                                         const Dynamics& dynamics);
 
 // A scene in motion. Not thread-safe; equal scenes and calls give equal bits.
 class Simulation {
@@ -107,8 +98,8 @@ class Simulation {
   bool textile_changed() const;
 
   // What holds particles and moves colliders now.
-  Handling handling() const;
-  // What is wrong with actions, see handle().
+  Constraints constraints() const;
+  // What is wrong with actions, see apply().
   std::vector<Problem> problems_of(const std::vector<Action>& actions) const;
   // Does all of them between two frames, at time(). Particles that are let go keep their velocity.
   // Where pins come or go the step is planned anew: then as set_textile(). Precondition:

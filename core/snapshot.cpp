@@ -27,12 +27,12 @@ bool fits(const SheetDefinition& definition, const Snapshot::Sheet& sheet, std::
          sheet.x.allFinite() && sheet.v.allFinite() && sheet.most_strain >= kMostStrain;
 }
 
-bool fits(const Scene& scene, const Handling& handling) {
-  return handling.pins.size() == scene.sheets.size() &&
-         handling.paths.size() == scene.colliders.size() &&
-         std::all_of(handling.grabs.begin(), handling.grabs.end(), [&](const Grab& grab) {
-           return grab.sheet < scene.sheets.size() && grab.particle >= 0 &&
-                  grab.particle < scene.sheets[grab.sheet].particle_count();
+bool fits(const Scene& scene, const Constraints& constraints) {
+  return constraints.pins.size() == scene.sheets.size() &&
+         constraints.paths.size() == scene.colliders.size() &&
+         std::all_of(constraints.grips.begin(), constraints.grips.end(), [&](const Grip& grip) {
+           return grip.sheet < scene.sheets.size() && grip.particle >= 0 &&
+                  grip.particle < scene.sheets[grip.sheet].particle_count();
          });
 }
 
@@ -40,7 +40,7 @@ bool fits(const Scene& scene, const Handling& handling) {
 
 bool fits(const Scene& scene, const Snapshot& snapshot) {
   if (snapshot.sheets.size() != scene.sheets.size() || snapshot.frame < 0 ||
-      snapshot.substeps < 0 || snapshot.frames_at_rest < 0 || !fits(scene, snapshot.handling))
+      snapshot.substeps < 0 || snapshot.frames_at_rest < 0 || !fits(scene, snapshot.constraints))
     return false;
   for (std::size_t s = 0; s < scene.sheets.size(); ++s)
     if (!fits(scene.sheets[s], snapshot.sheets[s], snapshot.frame)) return false;

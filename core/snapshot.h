@@ -5,19 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "core/model/handling.h"
+#include "core/model/actions.h"
 #include "core/model/mesh.h"
 #include "core/motion/energy_budget.h"
-#include "core/plan.h"
+#include "core/repairs.h"
 
 namespace weft {
-
-// A frame that had to be computed again with half the step, which then stays.
-struct Repair {
-  std::int64_t frame = 0;
-  double substep = 0;  // from then on, s
-  std::string reason;
-};
 
 // A simulation between two frames, as plain values: all that its later frames depend on beside the
 // scene, and what it shows of itself.
@@ -37,7 +30,7 @@ struct Snapshot {
   Plan plan;
   std::vector<Repair> repairs;  // all so far
   std::vector<Sheet> sheets;
-  Handling handling;
+  Constraints constraints;
 };
 
 // Whether a simulation of the scene, whatever its textiles are, could have been there.

@@ -156,7 +156,7 @@ double look(const Specimen& disc, const Matrix3Xd& rest, LabReport& report) {
   constexpr int kAngles = 360;
   const Shadow shadow(disc.mesh, rest), flat(disc.mesh, disc.start);
   const double held = std::numbers::pi * kHeldRadius * kHeldRadius;
-  LabCurve outline{join(1000 * disc.sheet.grid.spacing, " mm"), {"x m", "z m"}, {}};
+  LabCurve outline{join(1000 * disc.sheet.spacing(), " mm"), {"x m", "z m"}, {}};
   std::vector<double> radii;
   for (int k = 0; k <= kAngles; ++k) {
     const double angle = 2 * std::numbers::pi * k / kAngles, radius = shadow.radius(angle);
@@ -226,7 +226,7 @@ Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, dou
   disc.sheet = square.sheet;
   Eigen::ArrayXi place = Eigen::ArrayXi::Constant(side * side, -1);
   const int count = there.sum();
-  disc.sheet.grid = {1, count, spacing};
+  disc.sheet.shape = Grid{1, count, spacing};
   disc.start.resize(3, count);
   disc.held.resize(count);
   disc.mesh.mass.resize(count);

@@ -207,7 +207,7 @@ void hang_over(const MeasuredTextile& textile, const LabOrder& order, double ove
   const Equilibrium rest = strip.settle(stop, report);
   report.values.push_back(strip.angle(rest));
   LabCurve curve{
-      join("spacing ", 1000 * strip.specimen.sheet.grid.spacing, " mm"), {"x m", "drop m"}, {}};
+      join("spacing ", 1000 * strip.specimen.sheet.spacing(), " mm"), {"x m", "drop m"}, {}};
   for (int c = Cantilever::kHeld - 1; c < columns + Cantilever::kHeld; ++c) {
     const Vector3d x = rest.x.col(strip.specimen.at(strip.row, c));
     curve.rows.push_back({x.x(), -x.y()});
@@ -331,7 +331,7 @@ std::vector<Problem> find_problems(const LabOrder& order) {
   Scene scene;
   scene.sheets.resize(1);
   scene.sheets[0].name = "specimen";
-  scene.sheets[0].grid.spacing = 0.01;
+  scene.sheets[0].shape = Grid{.spacing = 0.01};
   scene.sheets[0].textile.model = order.textile;
   scene.sheets[0].bending = order.bending;
   std::vector<Problem> problems = find_problems(scene);

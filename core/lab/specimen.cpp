@@ -14,7 +14,7 @@ Specimen cut(const MeasuredTextile& textile, const BendingLaw& bending, int rows
              double spacing) {
   Specimen specimen;
   specimen.sheet.name = "specimen";
-  specimen.sheet.grid = {rows, columns, spacing};
+  specimen.sheet.shape = Grid{rows, columns, spacing};
   specimen.sheet.textile.model = textile;
   specimen.sheet.textile.damping = 0;
   specimen.sheet.bending = bending;
@@ -35,7 +35,7 @@ MeasuredTextile along_warp(const LabOrder& order) {
 
 LabValue value(const std::string& quantity, const std::string& unit, const Specimen& specimen,
                std::optional<double> asked, double found) {
-  return {quantity, unit, specimen.sheet.grid.spacing, static_cast<int>(specimen.start.cols()),
+  return {quantity, unit, specimen.sheet.spacing(), static_cast<int>(specimen.start.cols()),
           asked,    found};
 }
 

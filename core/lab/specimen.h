@@ -4,7 +4,7 @@
 
 #include "core/lab/equilibrium.h"
 #include "core/lab/lab.h"
-#include "core/model/mesh.h"
+#include "core/lattice/lattice.h"
 
 namespace weft {
 
@@ -15,8 +15,8 @@ struct Specimen {
   Matrix3Xd start;      // (3 x particles) m
   Eigen::ArrayXi held;  // (particles) 1 keeps its place
 
-  int rows() const { return sheet.grid.rows; }
-  int columns() const { return sheet.grid.columns; }
+  int rows() const { return grid_of(sheet).rows; }
+  int columns() const { return grid_of(sheet).columns; }
   int at(int row, int column) const { return row * columns() + column; }
   void hold_column(int column);
 };

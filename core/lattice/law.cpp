@@ -69,7 +69,7 @@ BendLaw<T> no_bend(int terms) {
 
 template <class T>
 void set_bending(const SheetDefinition& sheet, const LatticeConstants& k, SweepLaw<T>& law) {
-  const double h = sheet.grid.spacing;
+  const double h = sheet.spacing();
   const auto* choi_ko = std::get_if<ChoiKo>(&sheet.bending);
   if (choi_ko == nullptr) {
     const IsometricStiffness stiffness = isometric_stiffness(k, h);
@@ -154,14 +154,14 @@ void set_columns(double edge_share, SweepLaw<T>& law) {
 template <class T>
 SweepLaw<T> make_sweep_law(const SheetDefinition& sheet) {
   const LatticeConstants k = lattice_constants(sheet);
-  const double h = sheet.grid.spacing;
+  const double h = sheet.spacing();
   const T least = resists_compression(sheet.bending) ? std::numeric_limits<T>::lowest() : T(0);
   const auto stretch = [](double stiffness, double length, T lowest) {
     const auto [least_off, rest] = rounded<T>(stiffness, length);
     return StretchLaw<T>{least_off, rest, lowest};
   };
   SweepLaw<T> law;
-  law.layout = {sheet.grid.rows, sheet.grid.columns};
+  law.layout = {grid_of(sheet).rows, grid_of(sheet).columns};
   law.warp = stretch(k.stretch_warp, h, least);
   law.warp_edge = stretch(k.edge_share * k.stretch_warp, h, least);
   law.weft = stretch(k.stretch_weft, h, least);

@@ -1,7 +1,7 @@
 #pragma once
 
+#include "core/lattice/lattice.h"
 #include "core/lattice/sweep.h"
-#include "core/model/mesh.h"
 
 namespace weft {
 

@@ -1,3 +1,5 @@
+#include "core/lattice/solver.h"
+
 #include <algorithm>
 #include <limits>
 #include <optional>
@@ -7,7 +9,6 @@
 #include "core/lattice/contact.h"
 #include "core/lattice/law.h"
 #include "core/motion/saved_values.h"
-#include "core/motion/sheet_solver.h"
 
 namespace weft {
 namespace {
@@ -18,7 +19,7 @@ class LatticeSolver : public SheetSolver {
   LatticeSolver(const SheetDefinition& sheet, const Dynamics& dynamics,
                 const std::optional<Wind>& wind, bool compensated)
       : dynamics_(dynamics),
-        columns_(sheet.grid.columns),
+        columns_(grid_of(sheet).columns),
         particles_(sheet.particle_count()),
         damping_(sheet.textile.damping.value_or(kDefaultDamping)),
         law_(make_sweep_law<T>(sheet)),
@@ -260,15 +261,6 @@ std::unique_ptr<SheetSolver> make_lattice_solver(const SheetDefinition& sheet,
   if (settings.precision == Precision::kDouble)
     return std::make_unique<LatticeSolver<double>>(sheet, dynamics, wind, false);
   return std::make_unique<LatticeSolver<float>>(sheet, dynamics, wind, settings.compensated);
-}
-
-std::string_view needs_plain_solver(const Scene& scene, const SheetDefinition& sheet) {
-  if (scene.solver.plain) return "asked for";
-  if (scene.solver.integrator != IntegratorKind::kVerlet) return "the integrator is not VERLET";
-  const auto* law = std::get_if<ChoiKo>(&sheet.bending);
-  const bool slow = law != nullptr &&
-                    (law->evaluator == Evaluator::kSeries || law->evaluator == Evaluator::kExact);
-  return slow ? "the evaluator is SERIES or EXACT" : "";
 }
 
 }  // namespace weft

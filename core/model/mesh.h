@@ -75,7 +75,7 @@ struct Stencil {
   double stiffness;  // N/m
 };
 
-// Particles and connections: all that forces know of a sheet. A rectangular lattice makes one.
+// Particles and connections: all that forces know of a sheet.
 struct Mesh {
   VectorXd mass;       // (particles) kg
   VectorXd drag;       // (particles) in still air, kg/s; or empty: none
@@ -88,26 +88,7 @@ struct Mesh {
 // Whether stretch connections push.
 bool resists_compression(const BendingLaw& bending);
 
-// Constants of a textile on a lattice, inside it. Connections that lie along an edge have
-// edge_share of them: half of the sheet is missing there.
-struct LatticeConstants {
-  double edge_share;
-  double stretch_warp, stretch_weft, shear;       // N/m
-  double bend_warp, bend_weft, bend_diagonal;     // k_b, N m^2
-  double clamp_warp, clamp_weft, clamp_diagonal;  // c_b, N/m
-  double rigidity_warp, rigidity_weft;            // B, N m
-};
-LatticeConstants lattice_constants(const SheetDefinition& sheet);
-
-// Stiffness of the isometric law's stencils inside a lattice, N/m.
-struct IsometricStiffness {
-  double warp, weft, twist;
-};
-IsometricStiffness isometric_stiffness(const LatticeConstants& constants, double spacing);
-
-Mesh make_lattice(const SheetDefinition& sheet);
-
-// Positions at the start: those given, or the lattice as it is placed. Holds on to the sheet.
+// Positions at the start: those given, or the flat sheet as it is placed. Holds on to the sheet.
 class StartPositions {
  public:
   explicit StartPositions(const SheetDefinition& sheet);

@@ -4,30 +4,40 @@
 #include <algorithm>
 
 namespace weft {
+namespace {
+
+using ConstPlanes = Eigen::Map<const Eigen::MatrixX3d>;
+using Planes = Eigen::Map<Eigen::MatrixX3d>;
+
+void set_normals(const Grid& sheet, const ConstPlanes& x, Eigen::Index first, Planes& normals) {
+  const auto index = [&](int row, int column) {
+    return first + Eigen::Index{row} * sheet.columns + column;
+  };
+  for (int row = 0; row < sheet.rows; ++row) {
+    const int above = std::max(row - 1, 0), below = std::min(row + 1, sheet.rows - 1);
+    for (int column = 0; column < sheet.columns; ++column) {
+      const int left = std::max(column - 1, 0), right = std::min(column + 1, sheet.columns - 1);
+      const Eigen::Vector3d along = x.row(index(row, right)) - x.row(index(row, left));
+      const Eigen::Vector3d down = x.row(index(below, column)) - x.row(index(above, column));
+      normals.row(index(row, column)) = along.cross(down).normalized();
+    }
+  }
+}
+
+}  // namespace
 
 std::vector<double> normals_of(const std::vector<double>& positions,
-                               const std::vector<Grid>& sheets) {
+                               const std::vector<SheetShape>& sheets) {
   const auto particles = static_cast<Eigen::Index>(positions.size() / 3);
-  const Eigen::Map<const Eigen::MatrixX3d> x(positions.data(), particles, 3);
-  std::vector<double> normals(positions.size());
-  Eigen::Map<Eigen::MatrixX3d> to(normals.data(), particles, 3);
+  const ConstPlanes x(positions.data(), particles, 3);
+  std::vector<double> values(positions.size());
+  Planes normals(values.data(), particles, 3);
   Eigen::Index first = 0;
-  for (const Grid& sheet : sheets) {
-    const auto at = [&](int row, int column) {
-      return x.row(first + Eigen::Index{row} * sheet.columns + column);
-    };
-    for (int row = 0; row < sheet.rows; ++row) {
-      const int above = std::max(row - 1, 0), below = std::min(row + 1, sheet.rows - 1);
-      for (int column = 0; column < sheet.columns; ++column) {
-        const int left = std::max(column - 1, 0), right = std::min(column + 1, sheet.columns - 1);
-        const Eigen::Vector3d along = at(row, right) - at(row, left);
-        const Eigen::Vector3d down = at(below, column) - at(above, column);
-        to.row(first + Eigen::Index{row} * sheet.columns + column) = along.cross(down).normalized();
-      }
-    }
-    first += Eigen::Index{sheet.rows} * sheet.columns;
+  for (const SheetShape& sheet : sheets) {
+    std::visit([&](const auto& shape) { set_normals(shape, x, first, normals); }, sheet);
+    first += particle_count(sheet);
   }
-  return normals;
+  return values;
 }
 
 }  // namespace weft

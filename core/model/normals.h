@@ -12,6 +12,6 @@ namespace weft {
 // those in the column, which weighs the triangles around a particle by their area; 0 where there is
 // none.
 std::vector<double> normals_of(const std::vector<double>& positions,
-                               const std::vector<Grid>& sheets);
+                               const std::vector<SheetShape>& sheets);
 
 }  // namespace weft

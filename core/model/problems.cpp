@@ -2,7 +2,7 @@
 #include <cmath>
 #include <set>
 
-#include "core/model/handling.h"
+#include "core/model/actions.h"
 #include "core/model/scene.h"
 
 namespace weft {
@@ -137,12 +137,19 @@ void check_values(const std::string& field, const std::vector<double>& values, i
     check.number(at(field, i), values[i], -most, most, unit);
 }
 
-void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& check) {
+// Whether its particles can be counted.
+bool check_shape(const Grid& grid, const std::string& sheet, Check& check) {
   constexpr int kMostRows = 4096;
-  const std::string grid = field + ".grid.";
-  bool sized = check.number(grid + "rows", sheet.grid.rows, 2, kMostRows, "");
-  sized &= check.number(grid + "columns", sheet.grid.columns, 2, kMostRows, "");
-  check.number(grid + "spacing_m", sheet.grid.spacing, 1e-5, 10, "m");
+  const std::string field = sheet + ".grid.";
+  bool sized = check.number(field + "rows", grid.rows, 2, kMostRows, "");
+  sized &= check.number(field + "columns", grid.columns, 2, kMostRows, "");
+  check.number(field + "spacing_m", grid.spacing, 1e-5, 10, "m");
+  return sized;
+}
+
+void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& check) {
+  const bool sized =
+      std::visit([&](const auto& shape) { return check_shape(shape, field, check); }, sheet.shape);
   check_textile(sheet.textile, field + ".textile", check);
 
   if (const auto* law = std::get_if<ChoiKo>(&sheet.bending)) {

@@ -7,12 +7,12 @@
 #include <variant>
 #include <vector>
 
+#include "core/model/shape.h"
 #include "core/model/textile.h"
 
 namespace weft {
 
 using Eigen::Quaterniond;
-using Eigen::Vector3d;
 
 // Of a keyframe along each axis, m.
 inline constexpr double kMostOffset = 1e4;
@@ -27,13 +27,6 @@ struct Keyframe {
 // Offsets over time, linear between keyframes, constant outside; empty: no motion.
 using Path = std::vector<Keyframe>;
 Vector3d offset_at(const Path& path, double time);
-
-// rows x columns particles; particle (r, c) has index r * columns + c and lies at (c h, 0, r h).
-struct Grid {
-  int rows = 2;
-  int columns = 2;
-  double spacing = 0;  // h, m
-};
 
 enum class Evaluator { kSeries, kExact, kLinearized, kPolynomial };
 
@@ -61,7 +54,7 @@ struct Pin {
 
 struct SheetDefinition {
   std::string name;
-  Grid grid;
+  SheetShape shape;
   Textile textile;
   BendingLaw bending;
   Vector3d origin = Vector3d::Zero();              // of particle 0, m
@@ -71,7 +64,9 @@ struct SheetDefinition {
   std::vector<Pin> pins;
   std::optional<double> skin;  // m; absent: spacing / 10
 
-  int particle_count() const { return grid.rows * grid.columns; }
+  int particle_count() const { return weft::particle_count(shape); }
+  double spacing() const { return weft::spacing(shape); }                   // m
+  double skin_or_default() const { return skin.value_or(spacing() / 10); }  // m
 };
 
 struct Plane {

@@ -12,13 +12,14 @@ struct Load {
 Load load_of(const SheetDefinition& sheet, const Environment& environment) {
   const double given = environment.gravity.norm();
   const double gravity = given > 0 ? given : kStandardGravity;
-  const double h = sheet.grid.spacing;
+  const double h = sheet.spacing();
   const auto* measured = std::get_if<MeasuredTextile>(&sheet.textile.model);
   const double areal_density =
       measured != nullptr ? measured->areal_density
                           : std::get<RawTextile>(sheet.textile.model).particle_mass / (h * h);
   const double weight = areal_density * gravity;
-  return {weight * (sheet.grid.columns - 1) * h, weight * (sheet.grid.rows - 1) * h};
+  const auto [warp, weft] = extent(sheet.shape);
+  return {weight * warp * h, weight * weft * h};
 }
 
 }  // namespace

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
-#include <string_view>
 
 #include "core/contact/contact.h"
 #include "core/model/mesh.h"
@@ -48,15 +46,5 @@ class SheetSolver {
 
 // One connection after the other, in double; any integrator, any force.
 std::unique_ptr<SheetSolver> make_plain_solver(const Dynamics& dynamics, IntegratorKind integrator);
-
-// Rows of a lattice in vectors: Verlet. `dynamics` are the same forces in double, for
-// starts; both must outlive the solver.
-std::unique_ptr<SheetSolver> make_lattice_solver(const SheetDefinition& sheet,
-                                                 const Dynamics& dynamics,
-                                                 const std::optional<Wind>& wind,
-                                                 const SolverSettings& settings);
-
-// What make_lattice_solver() cannot step, as a reason; empty where it can.
-std::string_view needs_plain_solver(const Scene& scene, const SheetDefinition& sheet);
 
 }  // namespace weft

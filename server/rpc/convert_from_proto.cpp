@@ -119,7 +119,7 @@ Scene Reader::scene(const v1::Scene& from) {
 
 SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
   SheetDefinition sheet;
-  sheet.grid = {from.grid().rows(), from.grid().columns(), from.grid().spacing_m()};
+  sheet.shape = Grid{from.grid().rows(), from.grid().columns(), from.grid().spacing_m()};
   if (!from.has_grid()) missing(field + ".mesh", "grid", field + ".grid.");
   if (from.has_textile()) {
     sheet.textile = textile(from.textile(), field + ".textile");

@@ -84,12 +84,16 @@ void set(v1::Textile* to, const RawTextile& from) {
   raw->set_air_drag_kg_per_s(from.air_drag);
 }
 
+void set(v1::Sheet* to, const Grid& grid) {
+  to->mutable_grid()->set_rows(grid.rows);
+  to->mutable_grid()->set_columns(grid.columns);
+  to->mutable_grid()->set_spacing_m(grid.spacing);
+}
+
 void set(v1::Sheet* to, const SheetDefinition& from, const Textile& textile,
          StartValues start_values) {
   to->set_name(from.name);
-  to->mutable_grid()->set_rows(from.grid.rows);
-  to->mutable_grid()->set_columns(from.grid.columns);
-  to->mutable_grid()->set_spacing_m(from.grid.spacing);
+  std::visit([&](const auto& shape) { set(to, shape); }, from.shape);
   *to->mutable_textile() = to_proto(textile);
   std::visit([&](const auto& law) { set(to->mutable_bending(), law); }, from.bending);
   set(to->mutable_placement()->mutable_origin_m(), from.origin);
@@ -100,7 +104,7 @@ void set(v1::Sheet* to, const SheetDefinition& from, const Textile& textile,
                                                 from.start_velocities.end());
   }
   for (const auto& pin : from.pins) *to->add_pins() = to_proto(pin);
-  to->set_skin_m(from.skin.value_or(from.grid.spacing / 10));
+  to->set_skin_m(from.skin_or_default());
 }
 
 void set(v1::Collider* to, const Plane& plane) {

@@ -18,6 +18,15 @@ static_assert(int{Viewed::kHeaderFieldNumber} == int{Streamed::kHeaderFieldNumbe
               int{Viewed::kFrameFieldNumber} == int{Streamed::kFrameFieldNumber} &&
               int{Viewed::kProgressFieldNumber} == int{Streamed::kProgressFieldNumber});
 
+namespace {
+
+void set(v1::SheetLayout* to, const Grid& grid) {
+  to->set_rows(grid.rows);
+  to->set_columns(grid.columns);
+}
+
+}  // namespace
+
 bool FrameCall::begin(const grpc::ServerContextBase& context) {
   self_ = shared_from_this();
   auto admitted = backend_.admit(context);
@@ -64,7 +73,7 @@ grpc::Status FrameCall::take(const FoundSession& found, const std::string& uid,
   }
   if (!problems.empty()) return errors::field_invalid(problems);
   order_.format = with_defaults(order_.format);
-  for (const auto& sheet : session_->scene().sheets) order_.sheets.push_back(sheet.grid);
+  for (const auto& sheet : session_->scene().sheets) order_.sheets.push_back(sheet.shape);
   order_.most_bytes = backend_.limits.max_frame_bytes;
   return open();
 }
@@ -172,8 +181,7 @@ void FrameCall::write_header() {
     v1::SheetLayout* layout = header->add_sheets();
     layout->set_name(sheet.name);
     layout->set_first_particle(first_particle);
-    layout->set_rows(sheet.grid.rows);
-    layout->set_columns(sheet.grid.columns);
+    std::visit([&](const auto& shape) { set(layout, shape); }, sheet.shape);
     first_particle += sheet.particle_count();
   }
   *header->mutable_format() = order_.format;

@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/model/handling.h"
+#include "core/model/actions.h"
 #include "core/model/textile.h"
 #include "server/session/request.h"
 

@@ -267,7 +267,7 @@ bool Session::settle_restoring() {
 // The streams of the past are gone.
 void Session::let_go_of_streams() {
   std::set<int> hands;
-  for (const Grab& grab : simulation_.handling().grabs) hands.insert(grab.hand);
+  for (const Grip& grip : simulation_.constraints().grips) hands.insert(grip.hand);
   hands.erase(0);
   std::lock_guard lock(mutex_);
   for (const int hand : hands) {

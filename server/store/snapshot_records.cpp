@@ -147,16 +147,16 @@ std::string encode(const std::string& uid, const SessionSnapshot& snapshot) {
   to.set_frames_at_rest(simulation.frames_at_rest);
   to.set_halvings(simulation.halvings);
   for (const Repair& repair : simulation.repairs) *to.add_repairs() = to_proto(repair);
-  const Handling& handling = simulation.handling;
+  const Constraints& constraints = simulation.constraints;
   for (std::size_t s = 0; s < simulation.sheets.size(); ++s)
-    set(to.add_sheets(), simulation.sheets[s], handling.pins[s]);
-  for (const Path& path : handling.paths) *to.add_paths()->mutable_path() = to_proto(path);
-  for (const Grab& grab : handling.grabs) {
+    set(to.add_sheets(), simulation.sheets[s], constraints.pins[s]);
+  for (const Path& path : constraints.paths) *to.add_paths()->mutable_path() = to_proto(path);
+  for (const Grip& grip : constraints.grips) {
     stored::KeptGrab* kept = to.add_grabs();
-    kept->set_sheet(static_cast<int>(grab.sheet));
-    kept->set_particle(grab.particle);
-    kept->set_hand(grab.hand);
-    kept->set_pinned(grab.pinned);
+    kept->set_sheet(static_cast<int>(grip.sheet));
+    kept->set_particle(grip.particle);
+    kept->set_hand(grip.hand);
+    kept->set_pinned(grip.pinned);
   }
   for (const LogEntry& entry : snapshot.under_way)
     to.add_under_way()->ParseFromString(encode(entry));
@@ -201,12 +201,12 @@ SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes
                                        ramp.end()};
     }
     if (each.has_budget()) simulation.sheets.back().budget = budget_of(each.budget());
-    auto& pins = simulation.handling.pins.emplace_back();
+    auto& pins = simulation.constraints.pins.emplace_back();
     for (const auto& pin : each.pins()) pins.push_back(to_pin(pin));
   }
-  for (const auto& each : from.paths()) simulation.handling.paths.push_back(to_path(each.path()));
+  for (const auto& each : from.paths()) simulation.constraints.paths.push_back(to_path(each.path()));
   for (const auto& each : from.grabs()) {
-    simulation.handling.grabs.push_back(
+    simulation.constraints.grips.push_back(
         {static_cast<std::size_t>(each.sheet()), each.particle(), each.hand(), each.pinned()});
   }
   return snapshot;

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "client/scene_file.h"
-#include "core/model/mesh.h"
+#include "core/lattice/lattice.h"
 #include "server/rpc/convert.h"
 #include "tests/client/client_test.h"
 #include "tests/support/core/scenes.h"
@@ -72,7 +72,7 @@ TEST(Finds, SheetsWithoutAnyDampingGainLittleEnergyAndAreWarnedOf) {
     EXPECT_TRUE(warns(simulation, "UNDERDAMPED"));
     const SheetDefinition& sheet = scene.sheets[0];
     const double fall = make_lattice(sheet).mass.sum() * scene.environment.gravity.norm() *
-                        (sheet.grid.rows - 1) * sheet.grid.spacing;
+                        (grid_of(sheet).rows - 1) * sheet.spacing();
     const FrameStats start = simulation.stats();
     const double stored = start.kinetic_energy + start.potential_energy;
     while (simulation.time() < 5) {

@@ -28,7 +28,7 @@ Scene scene_of(const SheetDefinition& sheet) {
 }
 
 SheetDefinition held(SheetDefinition sheet) {
-  sheet.pins = {{{0, sheet.grid.columns - 1}, {}}};
+  sheet.pins = {{{0, grid_of(sheet).columns - 1}, {}}};
   return sheet;
 }
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <optional>
 
-#include "core/motion/sheet_solver.h"
+#include "core/sheet_factory.h"
 #include "tests/support/core/reference_case.h"
 #include "tests/support/core/scenes.h"
 

@@ -194,7 +194,7 @@ TEST(Simulation, ADampingGivenTooLowShortensTheStepAndAnAskedStepIsWarnedOf) {
 TEST(Simulation, ADampingRatioIsThatOfTheStiffestMode) {
   Scene scene = hanging(0);
   SheetDefinition& sheet = scene.sheets[0];
-  sheet.grid = {.rows = 2, .columns = 2, .spacing = 0.05};
+  sheet.shape = Grid{.rows = 2, .columns = 2, .spacing = 0.05};
   sheet.pins.clear();
   auto& textile = std::get<RawTextile>(sheet.textile.model);
   textile.shear = 0;
@@ -252,7 +252,7 @@ TEST(Simulation, UnderTheClampTwoBendingConstantsGiveTheSameBits) {
 
 Scene measured_scene(double spacing, const MeasuredTextile& textile) {
   Scene scene = hanging();
-  scene.sheets[0].grid.spacing = spacing;
+  std::get<Grid>(scene.sheets[0].shape).spacing = spacing;
   scene.sheets[0].textile.model = textile;
   return scene;
 }
@@ -543,7 +543,7 @@ TEST(Simulation, ADivergedRunIsReportedNotPublished) {
 TEST(Simulation, SheetsInOneSceneMoveAsTheyDoAlone) {
   Scene one = hanging(), other = hanging(1e-4), both = hanging();
   other.sheets[0].name = "other";
-  other.sheets[0].grid = {4, 9, 0.05};
+  other.sheets[0].shape = Grid{4, 9, 0.05};
   other.sheets[0].pins = {{{0, 8}, {}}};
   both.sheets.push_back(other.sheets[0]);
   for (Scene* scene : {&one, &other, &both}) scene->solver.substep = 1e-4;

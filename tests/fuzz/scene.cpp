@@ -18,8 +18,7 @@ constexpr std::int64_t kMostParticles = 400, kMostSubsteps = 40;  // so that a r
 
 std::int64_t particles_of(const Scene& scene) {
   std::int64_t particles = 0;
-  for (const auto& sheet : scene.sheets)
-    particles += std::int64_t{sheet.grid.rows} * sheet.grid.columns;
+  for (const auto& sheet : scene.sheets) particles += sheet.particle_count();
   return particles;
 }
 

@@ -12,7 +12,7 @@
 
 #include "core/forces/bending_law.h"
 #include "core/lab/lab.h"
-#include "core/motion/sheet_solver.h"
+#include "core/sheet_factory.h"
 #include "tests/reports/report.h"
 #include "tests/reports/trial.h"
 #include "tests/support/core/scenes.h"

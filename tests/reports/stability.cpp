@@ -32,7 +32,7 @@ SheetDefinition taut_sheet(int side = 7) {
 SheetDefinition crumpled_sheet() {
   SheetDefinition sheet = flat_sheet(8, 8);
   sheet.start_positions =
-      testing::values(start_positions(sheet) + 0.05 * sheet.grid.spacing * testing::noise(64, 3));
+      testing::values(start_positions(sheet) + 0.05 * sheet.spacing() * testing::noise(64, 3));
   return sheet;
 }
 
@@ -48,7 +48,7 @@ Scene scene_of(const SheetDefinition& sheet) {
 // Whether a disturbance of 1e-6 spacings stays below 1e-3 of them for 10 000 steps.
 bool survives(SheetDefinition sheet, double dt) {
   constexpr int kFrames = 10, kSteps = 1000;
-  const double h = sheet.grid.spacing;
+  const double h = sheet.spacing();
   const Matrix3Xd rest = start_positions(sheet);
   Matrix3Xd disturbed = rest + 1e-6 * h * testing::noise(sheet.particle_count());
   for (const int i : sheet.pins[0].particles) disturbed.col(i) = rest.col(i);

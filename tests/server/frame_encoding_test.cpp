@@ -43,7 +43,7 @@ TEST(FrameEncoding, IsMadeOnceForAllWatchersOfAFormat) {
 
 TEST(FrameEncoding, SendsNoMessageLargerThanItsBoundAndNoByteTwice) {
   const auto frame = frame_of_100();
-  FrameOrder order{.sheets = {{.rows = 4, .columns = 25}}};
+  FrameOrder order{.sheets = {Grid{.rows = 4, .columns = 25}}};
   order.format.set_velocities(true);
   order.format.set_normals(true);
   order.format.set_stats(true);

@@ -20,11 +20,11 @@ constexpr int kSteps = 4;
 
 // A crumpled sheet in motion, two corners held.
 Scene crumpled(SheetDefinition sheet, const std::optional<Wind>& wind = {}) {
-  const double h = sheet.grid.spacing;
+  const double h = sheet.spacing();
   const int n = sheet.particle_count();
   sheet.start_positions = values(start_positions(sheet) + 0.3 * h * noise(n));
   sheet.start_velocities = values(0.5 * noise(n, 2));
-  sheet.pins = {{{0, sheet.grid.columns - 1}, {}}};
+  sheet.pins = {{{0, grid_of(sheet).columns - 1}, {}}};
   Scene scene = floating(sheet);
   scene.environment.gravity = {0.3, -9.8, 0.1};
   scene.environment.wind = wind;
@@ -43,7 +43,7 @@ Simulation after(Scene scene, int frames) {
 // each of less than 16 roundings; with k dt^2 / m below the bound's 1 / 2 an acceleration error of
 // every step adds up to n (n + 1) / 2 of them.
 double tolerance(const Scene& scene, double epsilon) {
-  const Grid& grid = scene.sheets[0].grid;
+  const Grid& grid = grid_of(scene.sheets[0]);
   const double extent = grid.spacing * (std::max(grid.rows, grid.columns) + 2);
   return epsilon * extent * 12 * 16 * 0.5 * kSteps * (kSteps + 1) / 2;
 }
@@ -199,7 +199,7 @@ std::vector<T> swept(const SheetDefinition& sheet, bool poisoned, int bands = 1)
   for (int step = -1; step < 3; ++step) {
     if (step >= 0) sweep(law, state, bands, pool);
     for (int i = 0; i < sheet.particle_count(); ++i) {
-      const int r = i / sheet.grid.columns, c = i % sheet.grid.columns;
+      const int r = i / grid_of(sheet).columns, c = i % grid_of(sheet).columns;
       for (int axis = 0; axis < 3 && step < 0; ++axis)
         state.place(r, c)[State::kX + axis] = static_cast<T>(x(axis, i));
       if (step < 0) state.place(r, c)[State::kStep2] = T(1e-5);

@@ -22,7 +22,7 @@ std::pair<double, double> errors_on_a_cylinder(int n) {
       x[2 * particles + i] = 0.03 * row;
     }
   }
-  const auto normals = normals_of(x, {{.rows = n, .columns = n}});
+  const auto normals = normals_of(x, {Grid{.rows = n, .columns = n}});
   double within = 0, edge = 0;
   for (int row = 0; row < n; ++row) {
     for (int column = 0; column < n; ++column) {
@@ -46,9 +46,9 @@ TEST(Normals, OfACylinderAreItsOwnButForHalfACellAtItsEdges) {
 
 TEST(Normals, AreZeroWhereTheClothHasNoArea) {
   std::vector<double> x(12, 0);  // 2 x 2, all in one point
-  EXPECT_EQ(normals_of(x, {{.rows = 2, .columns = 2}}), std::vector<double>(12, 0));
+  EXPECT_EQ(normals_of(x, {Grid{.rows = 2, .columns = 2}}), std::vector<double>(12, 0));
   x = {0, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 0};  // in line
-  EXPECT_EQ(normals_of(x, {{.rows = 2, .columns = 2}}), std::vector<double>(12, 0));
+  EXPECT_EQ(normals_of(x, {Grid{.rows = 2, .columns = 2}}), std::vector<double>(12, 0));
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ TEST(Problems, AGoodSceneHasNone) { EXPECT_THAT(bad_fields(good()), IsEmpty()); 
 
 TEST(Problems, EveryOneIsFoundAndNamesFieldValueAndBounds) {
   Scene scene = good();
-  scene.sheets[0].grid.spacing = -0.5;
+  std::get<Grid>(scene.sheets[0].shape).spacing = -0.5;
   std::get<RawTextile>(scene.sheets[0].textile.model).bend =
       std::numeric_limits<double>::quiet_NaN();
   scene.solver.frame_step = 11;
@@ -104,7 +104,7 @@ TEST(Problems, DirectionsMustNotBeZero) {
 
 TEST(Problems, AHugeListOfThemIsCut) {
   Scene scene = good();
-  scene.sheets[0].grid = {100, 100, 0.01};
+  scene.sheets[0].shape = Grid{100, 100, 0.01};
   scene.sheets[0].start_positions.assign(30000, std::numeric_limits<double>::quiet_NaN());
   EXPECT_EQ(find_problems(scene).size(), 1000u);
 }

@@ -33,7 +33,7 @@ SheetDefinition pre_stretched(const Lattice& lattice) {
 
 // Whether a disturbance of 1e-6 h stays below `limit` x h for 20 000 steps.
 bool survives(SheetDefinition sheet, double limit, double dt) {
-  const double h = sheet.grid.spacing;
+  const double h = sheet.spacing();
   const Matrix3Xd rest = stretched(sheet, 0.02);
   Matrix3Xd disturbed = rest + 1e-6 * h * noise(sheet.particle_count());
   for (const int i : sheet.pins[0].particles) disturbed.col(i) = rest.col(i);

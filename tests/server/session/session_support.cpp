@@ -15,7 +15,7 @@ constexpr std::chrono::seconds kPatience{60};  // then a test has failed
 Scene hung_scene() {
   SheetDefinition sheet;
   sheet.name = "sheet";
-  sheet.grid = {4, 5, 0.05};
+  sheet.shape = Grid{4, 5, 0.05};
   sheet.textile.model = RawTextile{.particle_mass = 1e-3,
                                    .stretch = 200,
                                    .shear = 200,

@@ -91,7 +91,7 @@ TEST(Session, WithNothingToDoHoldsAThirdLessThanWhatItsSimulationMovesIn) {
     return static_cast<double>(now.uordblks + now.hblkhd);
   };
   Scene scene = hung_scene();
-  scene.sheets[0].grid = {101, 101, 0.01};
+  scene.sheets[0].shape = Grid{101, 101, 0.01};
   scene.solver.precision = Precision::kSingle;
   ASSERT_TRUE(Simulation(scene).advance_frame());  // leaves to this thread what threads keep
   const double before_moving = used();
@@ -328,7 +328,7 @@ TEST(Session, AStepEndsWithItsCaller) {
 // A frame of it takes minutes.
 Scene endless_scene() {
   Scene scene = hung_scene();
-  scene.sheets[0].grid = {30, 30, 0.05};
+  scene.sheets[0].shape = Grid{30, 30, 0.05};
   scene.solver.plain = true;
   scene.solver.frame_step *= 900'000 / static_cast<double>(Simulation(scene).plan().step.substeps);
   return scene;

@@ -26,7 +26,7 @@ Scene undisturbed_scene(std::mt19937_64& random) {
                                    .clamp = stretch * decades(1e-3, 1),
                                    .air_drag = 0};
   sheet.textile.damping = decades(1e-6, 1) * std::sqrt(mass * stretch);
-  const int columns = sheet.grid.columns, particles = sheet.particle_count();
+  const int columns = grid_of(sheet).columns, particles = sheet.particle_count();
   const int kind = whole(0, 3);
   if (kind > 0) sheet.pins = {{{0, columns - 1}, {}}};
   if (kind == 3) {
@@ -36,7 +36,7 @@ Scene undisturbed_scene(std::mt19937_64& random) {
   if (kind != 1) {  // crumpled
     Matrix3Xd x = start_positions(sheet);
     Matrix3Xd crumple =
-        decades(1e-4, 0.1) * sheet.grid.spacing * noise(particles, static_cast<unsigned>(random()));
+        decades(1e-4, 0.1) * sheet.spacing() * noise(particles, static_cast<unsigned>(random()));
     if (!sheet.pins.empty())
       for (const int i : sheet.pins[0].particles) crumple.col(i).setZero();
     sheet.start_positions = values(x + crumple);
@@ -56,8 +56,8 @@ EnergyTrial try_energy(const Scene& scene, double seconds) {
   const SheetDefinition& sheet = scene.sheets[0];
   const double mass =
       std::get<RawTextile>(sheet.textile.model).particle_mass * sheet.particle_count();
-  trial.weight = mass * scene.environment.gravity.norm() * sheet.grid.spacing *
-                 (std::max(sheet.grid.rows, sheet.grid.columns) - 1);
+  trial.weight = mass * scene.environment.gravity.norm() * sheet.spacing() *
+                 (std::max(grid_of(sheet).rows, grid_of(sheet).columns) - 1);
   constexpr int kFrames = 15;
   double least = std::numeric_limits<double>::infinity();
   while (simulation.time() < seconds) {

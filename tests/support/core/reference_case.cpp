@@ -54,7 +54,8 @@ ReferenceCase load_reference_case(const std::string& name) {
   const auto data = nlohmann::json::parse(open("reference/" + name + ".json"));
   SheetDefinition sheet;
   sheet.name = "sheet";
-  sheet.grid = {data["rows"], data["cols"], data["spacing"]};
+  const Grid grid{data["rows"], data["cols"], data["spacing"]};
+  sheet.shape = grid;
   sheet.textile.model = RawTextile{.particle_mass = data["mass"],
                                    .stretch = data["k_stretch"],
                                    .shear = data["k_shear"],
@@ -63,7 +64,7 @@ ReferenceCase load_reference_case(const std::string& name) {
                                    .air_drag = data["air_drag"]};
   sheet.textile.damping = data["k_damping"];
   sheet.bending = ChoiKo{.evaluator = Evaluator::kExact, .diagonal_bend = data["diagonal_bend"]};
-  sheet.start_positions = start_positions(data, sheet.grid);
+  sheet.start_positions = start_positions(data, grid);
   const auto pinned = data["pins"].get<std::vector<int>>();
   if (!pinned.empty()) sheet.pins.push_back({pinned, {}});
 

@@ -12,7 +12,7 @@ Textile paper_textile(double bend) {
 SheetDefinition flat_sheet(int rows, int columns, double spacing) {
   SheetDefinition sheet;
   sheet.name = "sheet";
-  sheet.grid = {rows, columns, spacing};
+  sheet.shape = Grid{rows, columns, spacing};
   sheet.textile = paper_textile();
   return sheet;
 }

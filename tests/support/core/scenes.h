@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/model/mesh.h"
+#include "core/lattice/lattice.h"
 #include "core/simulation.h"
 
 namespace weft::testing {

@@ -1,4 +1,4 @@
-#include "core/model/handling.h"
+#include "core/model/actions.h"
 
 #include <algorithm>
 
@@ -29,23 +29,24 @@ const char* name_of(Kind kind) {
   return "let_go";
 }
 
-class Handler {
+class ActionList {
  public:
-  Handler(const Moment& moment, Handling& handling) : moment_(moment), handling_(handling) {}
+  ActionList(const ActionContext& context, Constraints& constraints)
+      : context_(context), constraints_(constraints) {}
 
-  void handle(const Action& action, const std::string& place) {
+  void apply(const Action& action, const std::string& place) {
     field_ = place + "." + name_of(action.kind);
     const auto wrong = weft::find_problems(action, field_);
     problems_.insert(problems_.end(), wrong.begin(), wrong.end());
     if (!wrong.empty()) return;
     if (action.kind == Kind::kLetGo) return let_go(action.hand);
     if (action.kind == Kind::kMoveCollider) return move_collider(action);
-    const auto sheet = index_of(moment_.scene.sheets, action.name, ".sheet", "sheets");
+    const auto sheet = index_of(context_.scene.sheets, action.name, ".sheet", "sheets");
     if (!sheet) return;
-    const int last = moment_.scene.sheets[*sheet].particle_count() - 1;
+    const int last = context_.scene.sheets[*sheet].particle_count() - 1;
     if (action.particle < 0 || action.particle > last)
       return problem(".particle", join(action.particle, " is not within 0 to ", last));
-    handle(action, *sheet);
+    apply(action, *sheet);
   }
 
   std::vector<Problem> take() { return std::move(problems_); }
@@ -55,24 +56,24 @@ class Handler {
     problems_.push_back({field_ + field, std::move(message)});
   }
 
-  void handle(const Action& action, std::size_t sheet) {
+  void apply(const Action& action, std::size_t sheet) {
     const int particle = action.particle;
     const auto wrong = [&](const char* what) { problem(".particle", join(particle, what)); };
-    const auto grab = find_grab(sheet, particle);
-    const bool grabbed = grab != handling_.grabs.end();
+    const auto grip = find_grip(sheet, particle);
+    const bool grabbed = grip != constraints_.grips.end();
     const auto holder = find_pin(sheet, particle);
-    const bool pinned = grabbed ? grab->pinned : holder != handling_.pins[sheet].end();
+    const bool pinned = grabbed ? grip->pinned : holder != constraints_.pins[sheet].end();
 
     if (action.kind == Kind::kGrab) {
       if (grabbed) return wrong(" is grabbed already");
       if (!is_near(".particle", offset_of(sheet, particle))) return;
       hold(sheet, particle);
-      return handling_.grabs.push_back({sheet, particle, action.hand, pinned});
+      return constraints_.grips.push_back({sheet, particle, action.hand, pinned});
     }
     if (action.kind == Kind::kPin) {
       if (pinned) return wrong(" is pinned already");
       if (grabbed)
-        grab->pinned = true;
+        grip->pinned = true;
       else if (is_near(".particle", offset_of(sheet, particle)))
         hold(sheet, particle);
       return;
@@ -80,18 +81,18 @@ class Handler {
     if (action.kind == Kind::kUnpin) {
       if (!pinned) return wrong(" is not pinned");
       if (grabbed)
-        grab->pinned = false;
+        grip->pinned = false;
       else
         free(sheet, particle);
       return;
     }
     if (!grabbed) return wrong(" is not grabbed");
-    if (action.hand != 0 && action.hand != grab->hand)
+    if (action.hand != 0 && action.hand != grip->hand)
       return wrong(" is grabbed by another stream or call");
-    if (action.kind == Kind::kRelease) return release(grab);
-    const Vector3d to = action.target - moment_.start(sheet, particle);
+    if (action.kind == Kind::kRelease) return release(grip);
+    const Vector3d to = action.target - context_.start(sheet, particle);
     if (is_near(".target_m", to))
-      lead(action, offset_at(holder->path, moment_.time), to, holder->path);
+      lead(action, offset_at(holder->path, context_.time), to, holder->path);
   }
 
   // What is held has a path, bounded as those of a scene are.
@@ -119,10 +120,10 @@ class Handler {
   }
 
   void move_collider(const Action& action) {
-    const auto index = index_of(moment_.scene.colliders, action.name, ".collider", "colliders");
+    const auto index = index_of(context_.scene.colliders, action.name, ".collider", "colliders");
     if (!index) return;
-    Path& path = handling_.paths[*index];
-    lead(action, offset_at(path, moment_.time), action.target, path);
+    Path& path = constraints_.paths[*index];
+    lead(action, offset_at(path, context_.time), action.target, path);
   }
 
   // A straight path, from now on.
@@ -131,22 +132,22 @@ class Handler {
     const double way = (to - from).norm();
     const double least = way / kMostSpeed;
     const double duration =
-        action.duration.value_or(std::max(moment_.scene.solver.frame_step, least));
+        action.duration.value_or(std::max(context_.scene.solver.frame_step, least));
     if (duration < (1 - kRounding) * least)
       return problem(".duration_s", join(duration, " s is too short for ", way, " m: at ",
                                          kMostSpeed, " m/s, the most, they take ", least, " s"));
-    path = {{moment_.time, from}, {moment_.time + duration, to}};
+    path = {{context_.time, from}, {context_.time + duration, to}};
   }
 
-  std::vector<Grab>::iterator find_grab(std::size_t sheet, int particle) {
-    auto& grabs = handling_.grabs;
-    return std::find_if(grabs.begin(), grabs.end(), [&](const Grab& grab) {
-      return grab.sheet == sheet && grab.particle == particle;
+  std::vector<Grip>::iterator find_grip(std::size_t sheet, int particle) {
+    auto& grips = constraints_.grips;
+    return std::find_if(grips.begin(), grips.end(), [&](const Grip& grip) {
+      return grip.sheet == sheet && grip.particle == particle;
     });
   }
 
   std::vector<Pin>::iterator find_pin(std::size_t sheet, int particle) {
-    auto& pins = handling_.pins[sheet];
+    auto& pins = constraints_.pins[sheet];
     return std::find_if(pins.begin(), pins.end(), [&](const Pin& pin) {
       return std::find(pin.particles.begin(), pin.particles.end(), particle) != pin.particles.end();
     });
@@ -155,53 +156,63 @@ class Handler {
   // Where it is now, from its start.
   Vector3d offset_of(std::size_t sheet, int particle) {
     const auto pin = find_pin(sheet, particle);
-    if (pin != handling_.pins[sheet].end()) return offset_at(pin->path, moment_.time);
-    return moment_.position(sheet, particle) - moment_.start(sheet, particle);
+    if (pin != constraints_.pins[sheet].end()) return offset_at(pin->path, context_.time);
+    return context_.position(sheet, particle) - context_.start(sheet, particle);
   }
 
   // Where it is, by a pin of its own.
   void hold(std::size_t sheet, int particle) {
     const Vector3d offset = offset_of(sheet, particle);
     free(sheet, particle);
-    handling_.pins[sheet].push_back({{particle}, {{moment_.time, offset}}});
+    constraints_.pins[sheet].push_back({{particle}, {{context_.time, offset}}});
   }
 
   void free(std::size_t sheet, int particle) {
     const auto pin = find_pin(sheet, particle);
-    if (pin == handling_.pins[sheet].end()) return;
+    if (pin == constraints_.pins[sheet].end()) return;
     std::erase(pin->particles, particle);
-    if (pin->particles.empty()) handling_.pins[sheet].erase(pin);
+    if (pin->particles.empty()) constraints_.pins[sheet].erase(pin);
   }
 
-  void release(std::vector<Grab>::iterator grab) {
-    if (grab->pinned)
-      hold(grab->sheet, grab->particle);
+  void release(std::vector<Grip>::iterator grip) {
+    if (grip->pinned)
+      hold(grip->sheet, grip->particle);
     else
-      free(grab->sheet, grab->particle);
-    handling_.grabs.erase(grab);
+      free(grip->sheet, grip->particle);
+    constraints_.grips.erase(grip);
   }
 
   void let_go(int hand) {
-    for (std::size_t i = handling_.grabs.size(); i-- > 0;) {
-      const auto grab = handling_.grabs.begin() + static_cast<std::ptrdiff_t>(i);
-      if (grab->hand == hand) release(grab);
+    for (std::size_t i = constraints_.grips.size(); i-- > 0;) {
+      const auto grip = constraints_.grips.begin() + static_cast<std::ptrdiff_t>(i);
+      if (grip->hand == hand) release(grip);
     }
   }
 
-  const Moment& moment_;
-  Handling& handling_;
+  const ActionContext& context_;
+  Constraints& constraints_;
   std::string field_;  // of the action that is being done
   std::vector<Problem> problems_;
 };
 
 }  // namespace
 
-std::vector<Problem> handle(const Moment& moment, const std::vector<Action>& actions,
-                            Handling& handling) {
-  Handler handler(moment, handling);
-  for (std::size_t i = 0; i < actions.size(); ++i)
-    handler.handle(actions[i], join("actions[", i, "]"));
-  return handler.take();
+std::vector<Problem> apply(const std::vector<Action>& actions, const ActionContext& context,
+                           Constraints& constraints) {
+  ActionList list(context, constraints);
+  for (std::size_t i = 0; i < actions.size(); ++i) list.apply(actions[i], join("actions[", i, "]"));
+  return list.take();
+}
+
+bool hold_the_same(const Constraints& one, const Constraints& other) {
+  const auto same_particles = [](const Pin& a, const Pin& b) { return a.particles == b.particles; };
+  const auto same_pins = [&](const std::vector<Pin>& a, const std::vector<Pin>& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), same_particles);
+  };
+  const auto same_grip = [](const Grip& a, const Grip& b) { return a.pinned == b.pinned; };
+  return std::equal(one.pins.begin(), one.pins.end(), other.pins.begin(), same_pins) &&
+         std::equal(one.grips.begin(), one.grips.end(), other.grips.begin(), other.grips.end(),
+                    same_grip);
 }
 
 }  // namespace weft

@@ -1,4 +1,4 @@
-#include "core/model/handling.h"
+#include "core/model/actions.h"
 
 #include <gmock/gmock.h>
 
@@ -95,7 +95,7 @@ TEST_P(Handled, APinnedParticleMayBeDraggedAndStaysWhereItIsReleased) {
 }
 
 // Pins lengthen the stable step; grabs do not, so that it need not shorten when they end.
-TEST(Handling, PlansTheStepForWhatIsPinned) {
+TEST(Actions, PlansTheStepForWhatIsPinned) {
   Scene scene = curtain();
   Simulation free(scene);
   std::vector<Action> pins;
@@ -118,10 +118,10 @@ TEST(Handling, PlansTheStepForWhatIsPinned) {
   Simulation held(scene);
   ASSERT_FALSE(held.refusal());
   EXPECT_TRUE(held.act({act(Kind::kUnpin, 3)}));
-  EXPECT_EQ(held.handling().pins[0][0].particles.size(), 49);
+  EXPECT_EQ(held.constraints().pins[0][0].particles.size(), 49);
 }
 
-TEST(Handling, AtItsLargestSpeedBreaksNoFrame) {
+TEST(Actions, AtItsLargestSpeedBreaksNoFrame) {
   for (const double stretch : {2000.0, 20.0}) {
     Scene scene = curtain();
     std::get<RawTextile>(scene.sheets[0].textile.model).stretch = stretch;
@@ -139,7 +139,7 @@ TEST(Handling, AtItsLargestSpeedBreaksNoFrame) {
   }
 }
 
-TEST(Handling, WakesASleepingScene) {
+TEST(Actions, WakesASleepingScene) {
   Scene scene = curtain();
   scene.sheets[0].textile.damping = 0.02;
   std::get<RawTextile>(scene.sheets[0].textile.model).air_drag = 0.01;
@@ -160,7 +160,7 @@ TEST(Handling, WakesASleepingScene) {
   EXPECT_FALSE(simulation.asleep());
 }
 
-TEST(Handling, OfOneSheetChangesNoBitOfAnother) {
+TEST(Actions, OfOneSheetChangesNoBitOfAnother) {
   Scene scene = curtain();
   scene.sheets.push_back(scene.sheets[0]);
   scene.sheets[1].name = "other";
@@ -175,7 +175,7 @@ TEST(Handling, OfOneSheetChangesNoBitOfAnother) {
   EXPECT_NE(a, b);
 }
 
-TEST(Handling, SaysWhatIsWrongWithActions) {
+TEST(Actions, SaysWhatIsWrongWithActions) {
   Scene scene = curtain();
   scene.colliders = {{"ball", Sphere{Vector3d(5, 0, 0), 0.1}, 0.3, {}}};
   Simulation simulation(scene);

@@ -36,8 +36,8 @@ struct Action {
 // What is wrong with an action whatever the scene; `field` is its path.
 std::vector<Problem> find_problems(const Action& action, const std::string& field);
 
-// A particle in a hand. It has a pin of its own.
-struct Grab {
+// A particle held by a hand. It has a pin of its own.
+struct Grip {
   std::size_t sheet = 0;
   int particle = 0;
   int hand = 0;
@@ -45,14 +45,14 @@ struct Grab {
 };
 
 // What holds particles and moves colliders: at first as the scene says, then as actions change it.
-struct Handling {
+struct Constraints {
   std::vector<std::vector<Pin>> pins;  // of each sheet
   std::vector<Path> paths;             // of each collider
-  std::vector<Grab> grabs;
+  std::vector<Grip> grips;
 };
 
 // When actions meet a scene, and where its particles are then.
-struct Moment {
+struct ActionContext {
   const Scene& scene;
   double time = 0;  // s
   // Of a sheet's particle, m.
@@ -60,8 +60,11 @@ struct Moment {
 };
 
 // Does one action after the other. Answers what is wrong with them, with paths such as
-// "actions[0].drag.target_m.x"; then `handling` is to be thrown away.
-std::vector<Problem> handle(const Moment& moment, const std::vector<Action>& actions,
-                            Handling& handling);
+// "actions[0].drag.target_m.x"; then `constraints` is to be thrown away.
+std::vector<Problem> apply(const std::vector<Action>& actions, const ActionContext& context,
+                           Constraints& constraints);
+
+// Whether the same particles are held by the same pins and grips, wherever those lead.
+bool hold_the_same(const Constraints& one, const Constraints& other);
 
 }  // namespace weft

@@ -1,4 +1,4 @@
-#include "core/model/mesh.h"
+#include "core/lattice/lattice.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,23 @@
+#include "core/motion/rest.h"
+
+namespace weft {
+
+bool is_quiet(const Mesh& mesh, const VectorXd& inverse_mass, const Drive& drive, double height,
+              const SheetState& before, const SheetState& after) {
+  constexpr double kEnergyShare = 1e-6, kForceShare = 0.01;
+  const double given = drive.gravity.norm();
+  const double gravity = given > 0 ? given : kStandardGravity;
+  const double most_change = kForceShare * gravity * drive.frame_step;
+  double energy = 0, squares = 0;
+  int free = 0;
+  for (Eigen::Index i = 0; i < after.v.cols(); ++i) {
+    if (inverse_mass[i] == 0) continue;
+    energy += mesh.mass[i] / 2 * after.v.col(i).squaredNorm();
+    squares += (after.v.col(i) - before.v.col(i)).squaredNorm();
+    ++free;
+  }
+  return squares <= free * most_change * most_change &&
+         energy <= kEnergyShare * mesh.mass.sum() * gravity * height;
+}
+
+}  // namespace weft

@@ -1,0 +1,76 @@
+#include "core/moving_sheet.h"
+
+#include <algorithm>
+
+#include "core/forces/air.h"
+#include "core/forces/springs.h"
+#include "core/motion/stability.h"
+
+namespace weft {
+
+void MovingSheet::set_definition(const Scene& scene, const SheetDefinition& definition) {
+  mesh = make_mesh(definition);
+  if (const auto& ratio = definition.textile.damping_ratio)
+    mesh.damping = damping_for(mesh, *ratio);
+  else if (!definition.textile.damping)
+    mesh.damping = std::max(kDefaultDamping, damping_for(mesh, kSafeDampingRatio));
+  if (!scene.environment.wind) mesh.triangles = std::vector<std::array<int, 3>>();
+  set_pins(definition.pins);
+  dynamics.drag = mesh.drag;
+  dynamics.gravity = scene.environment.gravity;
+  skin = definition.skin_or_default();
+}
+
+void MovingSheet::set_pins(const std::vector<Pin>& pins) {
+  dynamics.inverse_mass = mesh.mass.cwiseInverse();
+  for (const Pin& pin : pins)
+    for (const int i : pin.particles) dynamics.inverse_mass[i] = 0;
+}
+
+void MovingSheet::bind_forces(const Scene& scene) {
+  dynamics.force = [&scene, this](double time, const Matrix3Xd& x, const Matrix3Xd& v,
+                                  Matrix3Xd& force) {
+    force.setZero(3, x.cols());
+    add_spring_forces(mesh, x, v, force);
+    if (!mesh.stencils.empty()) add_isometric_forces(mesh, x, force);
+    if (scene.environment.wind) add_wind_forces(*scene.environment.wind, mesh, time, x, v, force);
+  };
+  dynamics.air = [&scene](double time) {
+    return scene.environment.wind ? air_velocity(*scene.environment.wind, time)
+                                  : Vector3d(Vector3d::Zero());
+  };
+}
+
+double height_of(const SheetDefinition& sheet) {
+  const auto [warp, weft] = extent(sheet.shape);
+  return std::max(warp, weft) * sheet.spacing();
+}
+
+double end_of_paths(const Scene& scene) {
+  double end = 0;
+  const auto include = [&](const Path& path) {
+    if (!path.empty()) end = std::max(end, path.back().time);
+  };
+  for (const SheetDefinition& sheet : scene.sheets)
+    for (const Pin& pin : sheet.pins) include(pin.path);
+  for (const Collider& collider : scene.colliders) include(collider.path);
+  return end;
+}
+
+void move_pins(const std::vector<Pin>& pins, double time, double dt, MovingSheet& sheet) {
+  for (const Pin& pin : pins) {
+    if (pin.path.empty()) continue;
+    const Vector3d offset = offset_at(pin.path, time);
+    const Vector3d displacement = offset - offset_at(pin.path, time - dt);
+    for (const int i : pin.particles)
+      sheet.solver->move_held(i, sheet.start(i) + offset, displacement);
+  }
+}
+
+void set_pin_velocities(const std::vector<Pin>& pins, double time, double dt, Matrix3Xd& v) {
+  for (const Pin& pin : pins)
+    for (const int i : pin.particles)
+      v.col(i) = (offset_at(pin.path, time + dt) - offset_at(pin.path, time)) / dt;
+}
+
+}  // namespace weft

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "core/motion/energy_budget.h"
+#include "core/motion/guard.h"
+#include "core/sheet_factory.h"
+
+namespace weft {
+
+// A sheet in motion: its mesh, what moves it, and its state at the end of the last frame.
+struct MovingSheet {
+  explicit MovingSheet(const SheetDefinition& definition) : start(definition) {}
+
+  StartPositions start;  // that paths are relative to
+  Mesh mesh;
+  Dynamics dynamics;  // the forces in double
+  std::unique_ptr<SheetSolver> solver;
+  double skin = 0;  // m
+  double most_strain = kMostStrain;
+  EnergyBudget budget;
+  std::optional<TextileRamp> ramp;
+
+  // Mesh, forces and skin of a definition: its textile as it is simulated, and its pins.
+  void set_definition(const Scene& scene, const SheetDefinition& definition);
+  void set_pins(const std::vector<Pin>& pins);
+  // What the mesh or the scene lacks is not there to be computed. Holds on to both.
+  void bind_forces(const Scene& scene);
+
+  // At the end of the last frame. Between frames it is what the solver holds.
+  const SheetState& good() const {
+    if (good_.x.size() == 0) read(good_);
+    return good_;
+  }
+  void read_good() { read(good_); }
+  void set_good(SheetState& state) { std::swap(good_, state); }
+  void forget_good() { good_ = {}; }
+
+  void read(SheetState& state) const {
+    solver->positions(state.x);
+    solver->velocities(state.v);
+    state.kinetic_energy = kinetic_energy(mesh, state.v);
+  }
+
+ private:
+  mutable SheetState good_;  // empty: not looked at since
+};
+
+// From which a sheet may fall within itself, m.
+double height_of(const SheetDefinition& sheet);
+
+// When the last path ends, s.
+double end_of_paths(const Scene& scene);
+
+// Held particles follow the paths of their pins in the step of dt that ends at `time`.
+void move_pins(const std::vector<Pin>& pins, double time, double dt, MovingSheet& sheet);
+// Gives held particles the velocity of their paths in a step from `time` on.
+void set_pin_velocities(const std::vector<Pin>& pins, double time, double dt, Matrix3Xd& v);
+
+}  // namespace weft

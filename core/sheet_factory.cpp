@@ -1,0 +1,32 @@
+#include "core/sheet_factory.h"
+
+#include "core/lattice/lattice.h"
+#include "core/lattice/solver.h"
+
+namespace weft {
+
+Mesh make_mesh(const SheetDefinition& sheet) {
+  return std::visit([&](const Grid&) { return make_lattice(sheet); }, sheet.shape);
+}
+
+std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefinition& sheet,
+                                         const Dynamics& dynamics) {
+  if (!needs_plain_solver(scene, sheet).empty())
+    return make_plain_solver(dynamics, scene.solver.integrator);
+  return std::visit(
+      [&](const Grid&) {
+        return make_lattice_solver(sheet, dynamics, scene.environment.wind, scene.solver);
+      },
+      sheet.shape);
+}
+
+std::string_view needs_plain_solver(const Scene& scene, const SheetDefinition& sheet) {
+  if (scene.solver.plain) return "asked for";
+  if (scene.solver.integrator != IntegratorKind::kVerlet) return "the integrator is not VERLET";
+  const auto* law = std::get_if<ChoiKo>(&sheet.bending);
+  const bool slow = law != nullptr &&
+                    (law->evaluator == Evaluator::kSeries || law->evaluator == Evaluator::kExact);
+  return slow ? "the evaluator is SERIES or EXACT" : "";
+}
+
+}  // namespace weft

@@ -1,0 +1,197 @@
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <sstream>
+
+#include "core/simulation_state.h"
+
+namespace weft {
+
+// 1/kg. What is only gripped counts as free: no step is longer for that, and none shorter after it.
+VectorXd Simulation::State::planned_inverse_mass(std::size_t sheet) const {
+  VectorXd inverse_mass = sheets[sheet].dynamics.inverse_mass;
+  for (const Grip& grip : grips)
+    if (grip.sheet == sheet && !grip.pinned)
+      inverse_mass[grip.particle] = 1 / sheets[sheet].mesh.mass[grip.particle];
+  return inverse_mass;
+}
+
+Plan Simulation::State::plan_now() const {
+  std::vector<Matrix3Xd> x;
+  for (const MovingSheet& sheet : sheets) x.push_back(sheet.good().x);
+  return plan_for(x);
+}
+
+SheetStates Simulation::State::closing_states() const {
+  SheetStates states;
+  for (const MovingSheet& sheet : sheets) {
+    states.x.push_back(sheet.good().x);
+    sheet.solver->closing_velocities(time(), states.v.emplace_back());
+  }
+  return states;
+}
+
+// Sheets whose forces and step stay go on as they were.
+void Simulation::State::restart(const SheetStates& states, double old_dt,
+                                const std::vector<bool>& changed) {
+  const double dt = plan.step.substep;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    sheets[s].budget = {};
+    if (!changed[s] && dt == old_dt) continue;
+    sheets[s].solver->start(states.x[s], states.v[s], time(), dt);
+    sheets[s].read_good();
+  }
+}
+
+void Simulation::State::put_textile(std::size_t sheet, const Textile& textile) {
+  scene.sheets[sheet].textile = textile;
+  sheets[sheet].set_definition(scene, capped(sheet));
+}
+
+std::optional<StepRefusal> Simulation::State::set_textile(std::size_t sheet,
+                                                          const Textile& textile) {
+  const double dt = plan.step.substep;
+  const SheetStates before = closing_states();
+  const Textile old = scene.sheets[sheet].textile;
+  put_textile(sheet, textile);
+  Plan made = plan_now();
+  if (const auto refused = refusal_of(made.step)) {
+    put_textile(sheet, old);
+    return refused;
+  }
+  plan = std::move(made);
+  sheets[sheet].solver = make_solver(scene, simulated(sheet), sheets[sheet].dynamics);
+  std::vector<bool> changed(sheets.size());
+  changed[sheet] = true;
+  restart(before, dt, changed);
+  return std::nullopt;
+}
+
+// Gives sheets the textiles of the frame to come; false: one does not bear the step.
+bool Simulation::State::change_textiles() {
+  textile_changed = false;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    auto& ramp = sheets[s].ramp;
+    if (!ramp) continue;
+    if (const auto refused = set_textile(s, ramp->at(frame + 1))) {  // since particles were let go
+      std::ostringstream why;
+      why << "frame " << frame + 1 << " cannot be computed: as the textile of "
+          << scene.sheets[s].name << " changes, ";
+      if (refused->too_many_substeps)
+        why << "it needs " << refused->substeps << " substeps; at most " << refused->most_substeps
+            << " are computed";
+      else
+        why << "a substep of " << refused->asked << " s lies above its linear bound of "
+            << refused->bound << " s";
+      failure = why.str();
+      return false;
+    }
+    if (frame + 1 == ramp->end) ramp.reset();
+    textile_changed = true;
+    rest.disturb();
+  }
+  return true;
+}
+
+std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Textile& textile,
+                                                   double duration) {
+  State& state = *state_;
+  MovingSheet& sheet = state.sheets[index];
+  const Textile now = state.scene.sheets[index].textile;
+  if (!sheet.ramp && textile == now) return std::nullopt;
+  const double frames = std::ceil(duration / state.scene.solver.frame_step - 1e-9);
+  if (frames <= 1) {
+    if (const auto refused = state.set_textile(index, textile)) return refused;
+    sheet.ramp.reset();
+  } else {
+    state.put_textile(index, textile);
+    const Plan plan = state.plan_now();
+    state.put_textile(index, now);
+    if (const auto refused = state.refusal_of(plan.step)) return refused;
+    const std::int64_t begin = state.frame;
+    sheet.ramp = {now, textile, begin, begin + static_cast<std::int64_t>(frames)};
+  }
+  state.rest.disturb();
+  return std::nullopt;
+}
+
+const Textile& Simulation::target_textile(std::size_t index) const {
+  const auto& ramp = state_->sheets[index].ramp;
+  return ramp ? ramp->to : state_->scene.sheets[index].textile;
+}
+
+bool Simulation::textile_changed() const { return state_->textile_changed; }
+
+Constraints Simulation::State::constraints() const {
+  Constraints constraints{{}, {}, grips};
+  for (const SheetDefinition& sheet : scene.sheets) constraints.pins.push_back(sheet.pins);
+  for (const Collider& collider : scene.colliders) constraints.paths.push_back(collider.path);
+  return constraints;
+}
+
+void Simulation::State::adopt(Constraints constraints) {
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    scene.sheets[s].pins = std::move(constraints.pins[s]);
+    sheets[s].set_pins(scene.sheets[s].pins);
+  }
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
+    scene.colliders[c].path = std::move(constraints.paths[c]);
+  grips = std::move(constraints.grips);
+  rest_after = end_of_paths(scene);
+}
+
+ActionContext Simulation::State::action_context() const {
+  return {scene, time(), [this](std::size_t s, int i) { return sheets[s].start(i); },
+          [this](std::size_t s, int i) { return sheets[s].good().x.col(i); }};
+}
+
+Constraints Simulation::constraints() const { return state_->constraints(); }
+
+std::vector<Problem> Simulation::problems_of(const std::vector<Action>& actions) const {
+  Constraints after = constraints();
+  return apply(actions, state_->action_context(), after);
+}
+
+std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
+  State& state = *state_;
+  const Constraints before = constraints();
+  Constraints after = before;
+  [[maybe_unused]] const auto problems = apply(actions, state.action_context(), after);
+  assert(problems.empty());
+  if (hold_the_same(before, after)) {
+    state.adopt(std::move(after));
+    state.rest.disturb();
+    return std::nullopt;
+  }
+
+  SheetStates states = state.closing_states();
+  const double dt = state.plan.step.substep;
+  std::vector<VectorXd> held, planned;
+  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
+    held.push_back(state.sheets[s].dynamics.inverse_mass);
+    planned.push_back(state.planned_inverse_mass(s));
+  }
+  state.adopt(std::move(after));
+  std::vector<bool> changed(state.sheets.size());
+  bool plans = false;
+  for (std::size_t s = 0; s < state.sheets.size(); ++s) {
+    changed[s] = state.sheets[s].dynamics.inverse_mass != held[s];
+    plans = plans || state.planned_inverse_mass(s) != planned[s];
+  }
+  if (plans) {
+    Plan plan = state.plan_now();
+    if (const auto refused = state.refusal_of(plan.step)) {
+      state.adopt(before);
+      return refused;
+    }
+    state.plan = std::move(plan);
+  }
+  for (std::size_t s = 0; s < state.sheets.size(); ++s)
+    set_pin_velocities(state.scene.sheets[s].pins, state.time(), state.plan.step.substep,
+                       states.v[s]);
+  state.restart(states, dt, changed);
+  state.rest.disturb();
+  return std::nullopt;
+}
+
+}  // namespace weft

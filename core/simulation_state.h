@@ -1,0 +1,85 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/model/actions.h"
+#include "core/motion/rest.h"
+#include "core/moving_sheet.h"
+#include "core/repairs.h"
+#include "core/simulation.h"
+
+// What simulation.cpp (frames), simulation_changes.cpp (textiles, grips and pins) and
+// simulation_snapshot.cpp share; for nobody else.
+namespace weft {
+
+// Sheets at the end of the frame that is being computed.
+using NextStates = std::vector<SheetState>;
+
+// Positions and velocities of all sheets, to begin again with other forces or another step.
+struct SheetStates {
+  std::vector<Matrix3Xd> x, v;
+};
+
+// A frame that is being computed.
+struct UnfinishedFrame {
+  std::int64_t substeps = 0;       // taken by this attempt
+  std::optional<Snapshot> before;  // where it can be dropped
+};
+
+struct Simulation::State {
+  Scene scene;
+  SolverFactory make_solver;
+  Plan plan;
+  std::vector<MovingSheet> sheets;
+  std::vector<Grip> grips;  // their pins are among the scene's
+  std::int64_t frame = 0;
+  std::int64_t substeps = 0;  // of the last frame
+  double rest_after = 0;      // s
+  Repairs repairs;
+  Rest rest;
+  bool textile_changed = false;
+  std::string failure;
+  std::optional<UnfinishedFrame> unfinished;
+
+  State(Scene given, SolverFactory factory);
+  double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
+  int particle_count() const;
+  SheetDefinition capped(std::size_t sheet) const;
+  SheetDefinition simulated(std::size_t sheet) const;
+  VectorXd planned_inverse_mass(std::size_t sheet) const;
+  Plan plan_for(const std::vector<Matrix3Xd>& x) const;
+  Plan plan_now() const;
+  std::optional<StepRefusal> refusal_of(const StepPlan& step) const;
+
+  // frames
+  FramePart advance_frame(const Enough& enough, ThreadPool& pool);
+  bool begin_frame(bool in_parts);
+  bool take_substeps(const Enough& enough, ThreadPool& pool);
+  void step(double time, double dt, ThreadPool& pool);
+  Attempt inspect_sheets(NextStates& next);
+  Decision repair(const Attempt& made, NextStates& next);
+  void restart_from(NextStates& next);
+  bool keep_to_budget(NextStates& next);
+  bool fail(const char* what, const std::string& reason);
+  bool quiet(const NextStates& next) const;
+
+  // changes
+  void put_textile(std::size_t sheet, const Textile& textile);
+  std::optional<StepRefusal> set_textile(std::size_t sheet, const Textile& textile);
+  bool change_textiles();
+  Constraints constraints() const;
+  ActionContext action_context() const;
+  void adopt(Constraints constraints);
+  SheetStates closing_states() const;
+  void restart(const SheetStates& states, double old_dt, const std::vector<bool>& changed);
+
+  // snapshots
+  Snapshot snapshot() const;
+  void go_back_to(const Snapshot& before);
+  bool adopt(const Snapshot& snapshot);
+};
+
+}  // namespace weft

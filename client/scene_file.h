@@ -9,9 +9,6 @@ namespace weft::client {
 // Reads the protobuf JSON of a scene. What cannot be understood is a Problem with file and line.
 v1::Scene read_scene(const std::string& path);
 
-// The same of a textile.
-v1::Textile read_textile(const std::string& path);
-
 // A session made from the scene, or with validate_only what it would be. What the server finds
 // wrong is named by its place in the scene file.
 v1::Session create_session(Connection& connection, const v1::Scene& scene,

@@ -1,12 +1,11 @@
 #include "client/textile_change.h"
 
-#include "client/problem.h"
+#include <fmt/format.h>
+
+#include "client/message_field.h"
 
 namespace weft::client {
 namespace {
-
-using google::protobuf::FieldDescriptor;
-using google::protobuf::Message;
 
 // "raw.bend_n_m2" of "bend_n_m2", where the sheet's textile is raw.
 std::string full_path(const std::string& field, const v1::Textile& present) {
@@ -14,23 +13,6 @@ std::string full_path(const std::string& field, const v1::Textile& present) {
                      v1::Textile::descriptor()->FindFieldByName(field) != nullptr;
   if (known) return field;
   return (present.has_raw() ? "raw." : "measured.") + field;
-}
-
-void set_field(v1::Textile& textile, const std::string& path, double value) {
-  Message* message = &textile;
-  std::string field = path;
-  if (const std::size_t dot = path.find('.'); dot != std::string::npos) {
-    const FieldDescriptor* model = message->GetDescriptor()->FindFieldByName(path.substr(0, dot));
-    if (model == nullptr || model->message_type() == nullptr)
-      throw usage_problem("a textile has no field " + path);
-    message = message->GetReflection()->MutableMessage(message, model);
-    field = path.substr(dot + 1);
-  }
-  const FieldDescriptor* target = message->GetDescriptor()->FindFieldByName(field);
-  if (target == nullptr || target->cpp_type() != FieldDescriptor::CPPTYPE_DOUBLE) {
-    throw usage_problem("a textile has no number " + path);
-  }
-  message->GetReflection()->SetDouble(message, target, value);
 }
 
 v1::Textile textile_of(const v1::Session& session, const std::string& sheet_name) {
@@ -48,13 +30,14 @@ v1::UpdateTextileRequest textile_request(const v1::Session& session, const Texti
   request.set_sheet(change.sheet);
   if (change.duration_s) request.set_duration_s(*change.duration_s);
   const v1::Textile present = textile_of(session, change.sheet);
-  if (!change.preset.empty()) {
+  if (change.textile) {
     *request.mutable_textile() = present;
-    request.mutable_textile()->set_preset(change.preset);
+    request.mutable_textile()->clear_model();
+    request.mutable_textile()->MergeFrom(*change.textile);
   }
   for (const auto& [field, value] : change.values) {
     const std::string path = full_path(field, present);
-    set_field(*request.mutable_textile(), path, value);
+    set_field(*request.mutable_textile(), path, fmt::format("{}", value));
     request.mutable_update_mask()->add_paths(path);
   }
   return request;

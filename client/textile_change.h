@@ -9,10 +9,10 @@
 
 namespace weft::client {
 
-// New values for the textile of a sheet: a preset's, or some by name.
+// New values for the textile of a sheet: another textile, or some values by name.
 struct TextileChange {
-  std::string sheet{};   // empty: the only one
-  std::string preset{};  // damping and friction are not the preset's
+  std::string sheet{};                   // empty: the only one
+  std::optional<v1::Textile> textile{};  // damping and friction stay where it gives none
   std::vector<std::pair<std::string, double>> values{};  // "bend_n_m2" or "raw.bend_n_m2"
   std::optional<double> duration_s{};                    // simulated; absent: at once
 };

@@ -58,17 +58,12 @@ Problem surplus(const CLI::App& app, const std::string& word) {
 }
 
 // Fields of requests that options and arguments of other names stand for.
-constexpr std::array kNames{std::pair{"start_frame", "--from"},
-                            std::pair{"end_frame", "--to"},
-                            std::pair{"until_frame", "--to"},
-                            std::pair{"target_m", "--to"},
-                            std::pair{"duration_s", "--over"},
-                            std::pair{"session_id", "--id"},
-                            std::pair{"snapshot_id", "--id"},
-                            std::pair{"name", "SNAPSHOT"},
-                            std::pair{"name", "SESSION"},
-                            std::pair{"textile.preset", "--preset"},
-                            std::pair{"textile.preset", "--textile"}};
+constexpr std::array kNames{
+    std::pair{"start_frame", "--from"}, std::pair{"end_frame", "--to"},
+    std::pair{"until_frame", "--to"},   std::pair{"target_m", "--to"},
+    std::pair{"duration_s", "--over"},  std::pair{"session_id", "--id"},
+    std::pair{"snapshot_id", "--id"},   std::pair{"name", "SNAPSHOT"},
+    std::pair{"name", "SESSION"},       std::pair{"textile.preset", "--textile"}};
 
 // What the command line has for a field of a request; else the field.
 std::string given_name(const CLI::App& app, const std::string& field) {

@@ -73,6 +73,12 @@ FrameRange read_frame_range(const std::string& text) {
   return range;
 }
 
+std::pair<std::string, std::string> read_setting(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos) throw usage_problem("--set " + text + ": write FIELD=VALUE");
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
 std::pair<std::string, std::uint16_t> read_address(const char* option, const std::string& text,
                                                    bool insecure) {
   const std::size_t colon = text.rfind(':');

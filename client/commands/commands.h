@@ -83,6 +83,9 @@ void add_session_or_scene_argument(CLI::App& command, std::string& given);
 // "A:B", both included; either may be left out, and an empty text is all frames.
 FrameRange read_frame_range(const std::string& text);
 
+// "FIELD=VALUE" of --set as its parts.
+std::pair<std::string, std::string> read_setting(const std::string& text);
+
 // "HOST:PORT" as its parts. Refused where other machines reach it, and that is not what is wanted.
 std::pair<std::string, std::uint16_t> read_address(const char* option, const std::string& text,
                                                    bool insecure);

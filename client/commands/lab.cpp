@@ -9,7 +9,7 @@
 #include "client/output/status.h"
 #include "client/output/svg.h"
 #include "client/output/text.h"
-#include "client/scene_file.h"
+#include "client/textile_file.h"
 
 namespace weft::client {
 namespace {
@@ -32,11 +32,7 @@ struct LabOptions {
 v1::RunTestRequest request_of(const LabOptions& options) {
   v1::RunTestRequest request;
   request.set_test(options.test);
-  if (options.textile.ends_with(".json")) {
-    *request.mutable_textile() = read_textile(options.textile);
-  } else {
-    request.mutable_textile()->set_preset(options.textile);
-  }
+  *request.mutable_textile() = textile_named(options.textile);
   if (options.isometric) {
     request.mutable_bending()->mutable_isometric();
   } else {
@@ -236,7 +232,7 @@ void add_test(CLI::App& lab, Context& context, const char* name, v1::LabTest tes
   CLI::App* command = lab.add_subcommand(name, description);
   command
       ->add_option("--textile", options->textile,
-                   "Preset (weft textile list), or a JSON file of weft.v1.Textile")
+                   "Preset (weft textile list), or a file (weft textile new)")
       ->option_text("NAME|FILE.json")
       ->required();
   command->add_option("--direction", options->direction, "How the specimen is cut [warp]")

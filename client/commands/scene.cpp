@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
-#include <filesystem>
-
 #include "client/commands/commands.h"
 #include "client/exports/output_file.h"
+#include "client/message_field.h"
 #include "client/output/text.h"
 #include "client/scene_file.h"
 #include "client/templates/templates.h"
+#include "client/textile_file.h"
 
 namespace weft::client {
 namespace {
@@ -15,20 +15,23 @@ struct NewOptions {
   std::string name;
   std::string path;
   bool replace = false;
+  std::string textile;
+  std::vector<std::string> fields;  // "solver.safety=0.5"
   TemplateOptions values;
 };
 
-void run_new(Context& context, const NewOptions& options) {
-  const v1::Scene scene = make_template(options.name, options.values);
+void run_new(Context& context, NewOptions options) {
+  if (!options.textile.empty()) options.values.textile = textile_named(options.textile);
+  v1::Scene scene = make_template(options.name, options.values);
+  for (const std::string& field : options.fields) {
+    const auto [place, value] = read_setting(field);
+    set_field(scene, place, value);
+  }
   if (options.path.empty()) {
     context.terminal.out << scene_text(scene) << std::flush;
     return;
   }
-  if (!options.replace && std::filesystem::exists(options.path))
-    throw unwritable(options.path, "the file exists; --force replaces it");
-  OutputFile file(options.path);
-  file.write(scene_text(scene));
-  file.close();
+  write_new_file(options.path, scene_text(scene), options.replace);
   context.answer({{"file", options.path}}, "wrote " + options.path + '\n');
 }
 
@@ -81,8 +84,10 @@ void add_new(CLI::App& scene, Context& context) {
   command->add_option("--spacing", values.spacing_m, "Distance between neighbours, m")
       ->type_name("M")
       ->check(CLI::Range(1e-5, 10.0));
-  command->add_option("--textile", values.textile, "Textile preset (weft textile list)")
-      ->type_name("NAME");
+  command
+      ->add_option("--textile", options->textile,
+                   "Preset (weft textile list), or a file (weft textile new)")
+      ->option_text("NAME|FILE.json");
   command->add_option("--bend", values.bend, "k_b in the paper's unit, 1e-4 N m^2 (paper-*)")
       ->type_name("K");
   command->add_option("--evaluator", values.evaluator, "How bending is computed")
@@ -97,6 +102,11 @@ void add_new(CLI::App& scene, Context& context) {
   command->add_option("--accuracy", values.accuracy, "How close to the equations, and how fast")
       ->transform(one_of(accuracies))
       ->option_text("draft|standard|fine");
+  command
+      ->add_option("--set", options->fields,
+                   "One value by its place, such as sheets[0].skin_m=0.003; may be given again")
+      ->option_text("FIELD=VALUE ...")
+      ->allow_extra_args(false);
   command->footer(template_list());
   command->callback([&context, options] { run_new(context, *options); });
 }

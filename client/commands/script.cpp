@@ -126,7 +126,8 @@ constexpr const char* kFooter =
 
 create   template, with the options of `weft scene new`, or scene;
          fields: {PLACE: VALUE ...}
-set      preset or fields: {FIELD: VALUE ...}; sheet; over_s, else at once
+set      textile, a preset or file, or fields: {FIELD: VALUE ...};
+         sheet; over_s, else at once
 grab     row, column; sheet; likewise release, pin and unpin
 drag     row, column; sheet; to_m: [X, Y, Z]; over_s; moves as it runs on
 move     collider; to_m, an offset from its start; over_s

@@ -55,4 +55,12 @@ void OutputFile::check() {
   if (!file_) throw unwritable(path_, std::strerror(errno));
 }
 
+void write_new_file(const std::string& path, std::string_view text, bool replace) {
+  if (!replace && std::filesystem::exists(path))
+    throw unwritable(path, "the file exists; --force replaces it");
+  OutputFile file(path);
+  file.write(text);
+  file.close();
+}
+
 }  // namespace weft::client

@@ -35,4 +35,7 @@ class OutputFile {
   bool closed_ = false;
 };
 
+// Writes all of a file; one that exists only where it may be replaced.
+void write_new_file(const std::string& path, std::string_view text, bool replace);
+
 }  // namespace weft::client

@@ -80,7 +80,7 @@ std::pair<Axis, Axis> axes_of(const Plot& plot) {
 }
 
 // The plot with logarithms for points, as far as they have them.
-Plot drawn(Plot plot) {
+Plot as_drawn(Plot plot) {
   if (!plot.logarithmic) return plot;
   for (Series& series : plot.series) {
     std::erase_if(series.points,
@@ -110,7 +110,7 @@ std::string escaped(const std::string& text) {
 }
 
 std::string svg_text(const Plot& given) {
-  const Plot plot = drawn(given);
+  const Plot plot = as_drawn(given);
   const auto [x_axis, y_axis] = axes_of(plot);
   const auto place_x = [&, x = x_axis](double value) {
     return kLeft + (value - x.low) / (x.high - x.low) * (kWidth - kLeft - kRight);

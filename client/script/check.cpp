@@ -100,7 +100,7 @@ class Checker {
         google::protobuf::util::FieldMaskUtil::MergeMessageTo(
             request.textile(), request.update_mask(), {}, sheet.mutable_textile());
       } else if (request.duration_s() > 0 && sheet.textile().has_raw()) {
-        return fault(step, ".over_s", "leads from raw to raw; change to a preset at once");
+        return fault(step, ".over_s", "leads from raw to raw; change to a measured one at once");
       } else {
         *sheet.mutable_textile() = request.textile();
       }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <google/protobuf/util/json_util.h>
 
 #include <algorithm>
 #include <array>
@@ -10,11 +9,12 @@
 #include <functional>
 
 #include "client/input_file.h"
-#include "client/output/json.h"
+#include "client/message_field.h"
 #include "client/output/text.h"
 #include "client/scene_file.h"
 #include "client/script/fields.h"
 #include "client/templates/templates.h"
+#include "client/textile_file.h"
 
 namespace weft::client {
 namespace {
@@ -219,17 +219,29 @@ class ScriptReader {
     const YAML::Node changes = fields.node("fields");
     if (fields.has("template") == fields.has("scene"))
       fields.fault("", "give either template or scene");
-    const auto try_to = [&](const std::string& key, const auto& work) {
-      try {
-        work();
-      } catch (const Problem& problem) {
-        fields.fault(key, problem.what());
-      }
-    };
-    if (name) try_to("template", [&] { step.scene = make_template(*name, options); });
-    if (file) try_to("scene", [&] { step.scene = read_scene(from_here(*file)); });
+    if (name) try_to(fields, "template", [&] { step.scene = make_template(*name, options); });
+    if (file) try_to(fields, "scene", [&] { step.scene = read_scene(from_here(*file)); });
     if (fields.has("fields")) change_scene(changes, scope, step.scene);
     return step;
+  }
+
+  // What goes wrong with it is a fault of the field.
+  template <class Work>
+  static void try_to(Fields& fields, const std::string& key, const Work& work) {
+    try {
+      work();
+    } catch (const Problem& problem) {
+      fields.fault(key, problem.what());
+    }
+  }
+
+  // The textile that a field names, if any.
+  std::optional<v1::Textile> read_textile(Fields& fields, const std::string& key) const {
+    std::optional<v1::Textile> textile;
+    if (const auto name = fields.text(key))
+      try_to(fields, key,
+             [&] { textile = textile_named(is_textile_file(*name) ? from_here(*name) : *name); });
+    return textile;
   }
 
   // One of some words, each with its value.
@@ -247,7 +259,7 @@ class ScriptReader {
     return std::nullopt;
   }
 
-  static TemplateOptions read_template_options(Fields& fields) {
+  TemplateOptions read_template_options(Fields& fields) const {
     constexpr std::array kEvaluators{std::pair{"series", v1::EVALUATOR_SERIES},
                                      std::pair{"exact", v1::EVALUATOR_EXACT},
                                      std::pair{"linearized", v1::EVALUATOR_LINEARIZED},
@@ -263,7 +275,7 @@ class ScriptReader {
     options.rows = count("rows", 4096);
     options.columns = count("columns", 4096);
     options.spacing_m = fields.number("spacing_m", 1e-5, 10);
-    options.textile = fields.text("textile");
+    options.textile = read_textile(fields, "textile");
     options.bend = fields.number("bend", 0, 1e5);
     options.segments = count("segments", 65536);
     options.fold_clamp = fields.flag("fold_clamp").value_or(false);
@@ -285,28 +297,11 @@ class ScriptReader {
     for (const std::string& key : fields.keys()) {
       const auto value = fields.text(key);
       if (!value) continue;
-      std::string pointer = '/' + key;
-      std::replace(pointer.begin(), pointer.end(), '.', '/');
-      std::replace(pointer.begin(), pointer.end(), '[', '/');
-      pointer.erase(std::remove(pointer.begin(), pointer.end(), ']'), pointer.end());
-      v1::Scene changed;
       try {
-        Json json = to_json(scene, Defaults::kLeftOut);
-        const auto number = read_number(*value);
-        json[Json::json_pointer(pointer)] = number ? Json(*number)
-                                            : *value == "true" || *value == "false"
-                                                ? Json(*value == "true")
-                                                : Json(*value);
-        const auto status = google::protobuf::util::JsonStringToMessage(json.dump(), &changed);
-        if (!status.ok()) {
-          fields.fault(key, std::string(status.message()));
-          continue;
-        }
-      } catch (const Json::exception&) {
-        fields.fault(key, "a scene has no such place");
-        continue;
+        set_field(scene, key, *value);
+      } catch (const Problem& problem) {
+        fields.fault(key, problem.what());
       }
-      scene = changed;
     }
   }
 
@@ -314,11 +309,12 @@ class ScriptReader {
     SetStep step;
     step.session = read_session(fields);
     step.change.sheet = fields.text("sheet").value_or("");
-    step.change.preset = fields.text("preset").value_or("");
+    for (const char* key : {"textile", "preset"})
+      if (auto textile = read_textile(fields, key)) step.change.textile = std::move(textile);
     step.change.duration_s = fields.number("over_s", 0, 1e4);
     const YAML::Node values = fields.node("fields");
-    if (fields.has("preset") == fields.has("fields"))
-      fields.fault("", "give either preset or fields");
+    if (fields.has("textile") + fields.has("preset") + fields.has("fields") != 1)
+      fields.fault("", "give either textile or fields");
     if (!fields.has("fields")) return step;
     Fields numbers(values, "set.fields", scope);
     for (const std::string& key : numbers.keys()) {

@@ -35,8 +35,9 @@ v1::Sheet* add_sheet(v1::Scene& scene, const SheetDefaults& defaults,
   grid->set_columns(options.columns.value_or(defaults.columns));
   grid->set_spacing_m(options.spacing_m.value_or(defaults.width / (grid->columns() - 1)));
 
-  sheet->mutable_textile()->set_preset(options.textile.value_or("wool_tropical"));
+  sheet->mutable_textile()->set_preset("wool_tropical");
   sheet->mutable_textile()->set_damping_kg_per_s(defaults.damping);
+  if (options.textile) sheet->mutable_textile()->MergeFrom(*options.textile);
 
   const bool linearized = !options.evaluator || *options.evaluator == v1::EVALUATOR_LINEARIZED;
   const std::optional<int> segments =

@@ -14,7 +14,7 @@ struct TemplateOptions {
   std::optional<int> rows{};
   std::optional<int> columns{};
   std::optional<double> spacing_m{};     // else the sheet is 1 m wide (cantilever: 32 mm)
-  std::optional<std::string> textile{};  // a preset
+  std::optional<v1::Textile> textile{};  // its model alone where it gives no damping
   std::optional<double> bend{};          // paper-*: k_b in the paper's unit, kPaperBend
   std::optional<v1::Evaluator> evaluator{};
   std::optional<int> segments{};  // of LINEARIZED

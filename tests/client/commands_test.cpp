@@ -208,6 +208,97 @@ TEST_F(CommandsTest, ASceneFileIsReplacedOnlyWhereAskedTo) {
   EXPECT_EQ(run_weft(forced).exit, 0);
 }
 
+TEST_F(CommandsTest, AValueOfANewSceneIsSetByItsPlace) {
+  const auto make = [](const std::string& setting) {
+    return run_weft({"scene", "new", "--template", "sphere", "--set", setting, "--set",
+                     "sheets[0].pins[0].particles[0]=3"});
+  };
+  const auto scene = make("sheets[0].textile.damping_ratio=0.01").json();
+  EXPECT_EQ(scene["sheets"][0]["textile"]["damping_ratio"], 0.01);
+  EXPECT_FALSE(scene["sheets"][0]["textile"].contains("damping_kg_per_s")) << "one of both";
+  EXPECT_EQ(scene["sheets"][0]["pins"][0]["particles"][0], 3);
+  EXPECT_EQ(make("solver.integrator=INTEGRATOR_RK4").json()["solver"]["integrator"],
+            "INTEGRATOR_RK4");
+
+  const auto refusal = [&](const std::string& setting) {
+    const Outcome refused = make(setting);
+    EXPECT_EQ(refused.exit, 2);
+    return refused.err;
+  };
+  EXPECT_THAT(refusal("solver.safty=1"), HasSubstr("no such field: safty; SolverSettings has"));
+  EXPECT_THAT(refusal("solver.safety=high"), HasSubstr("\"high\" is not a number"));
+  EXPECT_THAT(refusal("solver.integrator=RK4"), HasSubstr("INTEGRATOR_RK4"));
+  EXPECT_THAT(refusal("sheets.name=a"), HasSubstr("sheets[0]"));
+  EXPECT_THAT(refusal("sheets[7].name=a"), HasSubstr("sheets has 1 elements"));
+  EXPECT_THAT(refusal("solver.safety"), HasSubstr("FIELD=VALUE"));
+}
+
+TEST_F(CommandsTest, ATextileOfOnesOwnIsAFileThatIsTakenWhereAPresetIs) {
+  const std::string file = path("mine.json");
+  const std::vector<std::string> make = {"textile",
+                                         "new",
+                                         "-o",
+                                         file,
+                                         "--areal-density",
+                                         "0.19",
+                                         "--tensile-warp",
+                                         "900",
+                                         "--shear",
+                                         "30",
+                                         "--bend-warp",
+                                         "7e-6",
+                                         "--bend-weft",
+                                         "5e-6",
+                                         "--source",
+                                         "FAST, lab report 12"};
+  const Outcome incomplete = run_weft(make);
+  EXPECT_EQ(incomplete.exit, 2);
+  EXPECT_THAT(incomplete.err, HasSubstr("give --tensile-weft; or --from"));
+  auto complete = make;
+  complete.insert(complete.end(), {"--tensile-weft", "700"});
+  ASSERT_EQ(run_weft(complete).exit, 0) << run_weft(complete).err;
+  EXPECT_EQ(run_weft(complete).exit, 4) << "it is there";
+  EXPECT_THAT(run_weft({"textile", "show", file}).out,
+              AllOf(HasSubstr("FAST, lab report 12"), HasSubstr("areal_density_kg_per_m2")));
+
+  ask({"scene", "new", "--template", "hang", "--textile", file, "-o", path("hang.json")});
+  ask({"session", "create", path("hang.json"), "--id", "hang"});
+  const auto measured = [&] {
+    return ask({"session", "get", "hang"})["scene"]["sheets"][0]["textile"]["measured"];
+  };
+  EXPECT_EQ(measured()["tensile_weft_n_per_m"], 700);
+  ask({"textile", "set", "hang", "--textile", "denim_11oz"});
+  EXPECT_NE(measured()["tensile_weft_n_per_m"], 700);
+  ask({"textile", "set", "hang", "--textile", file});
+  EXPECT_EQ(measured()["tensile_weft_n_per_m"], 700);
+  const auto tested = ask({"lab", "shear", "--isometric", "--textile", file});
+  EXPECT_EQ(tested["values"][0]["asked"], 30);
+}
+
+TEST_F(CommandsTest, ATextileMayBeginWithAnotherAndItsValuesAreChecked) {
+  const std::string file = path("denser.json");
+  ASSERT_EQ(
+      run_weft({"textile", "new", "-o", file, "--from", "wool_tropical", "--areal-density", "0.4"})
+          .exit,
+      0);
+  const auto own = ask({"textile", "show", file});
+  const auto wool = ask({"textile", "show", "wool_tropical"});
+  EXPECT_EQ(own["values"]["areal_density_kg_per_m2"], 0.4);
+  EXPECT_EQ(own["values"]["shear_n_per_m"], wool["values"]["shear_n_per_m"]);
+  const Outcome refused = run_weft({"textile", "new", "-o", path("bad.json"), "--from",
+                                    "wool_tropical", "--areal-density", "-1"});
+  EXPECT_EQ(refused.exit, 1);
+  EXPECT_THAT(refused.err, HasSubstr("--areal-density: -1 kg/m^2 is not within 1e-04 to 100 kg/m^2"));
+  EXPECT_FALSE(std::filesystem::exists(path("bad.json")));
+}
+
+TEST_F(CommandsTest, AMeshTakenForASceneIsToldApart) {
+  write_file(path("shirt.obj"), "v 0 0 0\n");
+  const Outcome refused = weft({"scene", "check", path("shirt.obj")});
+  EXPECT_EQ(refused.exit, 4);
+  EXPECT_THAT(refused.err, HasSubstr("is a mesh, not a scene file"));
+}
+
 TEST_F(CommandsTest, WhereNoServerIsNamedAFileNeedsNone) {
   const std::string scene = scene_file(small_scene());
   EXPECT_EQ(run_weft({"scene", "check", scene}).exit, 0);

@@ -142,6 +142,24 @@ steps:
   EXPECT_DOUBLE_EQ(recording.scene().sheets(0).textile().raw().bend_n_m2(), 0.2e-4);
 }
 
+TEST_F(ScriptTest, ATextileMayBeAFileBesideTheScript) {
+  write_file(path("mine.json"),
+             R"({"values": {"areal_density_kg_per_m2": 0.2, "tensile_warp_n_per_m": 300,
+                 "tensile_weft_n_per_m": 200, "shear_n_per_m": 30, "bend_rigidity_warp_n_m": 1e-6,
+                 "bend_rigidity_weft_n_m": 1e-6}})");
+  const auto result = ask({"script", script(R"(
+steps:
+  - create: {template: hang, rows: 4, columns: 4, textile: mine.json}
+  - set: {textile: mine.json}
+  - set: {textile: denim_11oz}
+  - record: {file: own.weft}
+  - run: {until_frame: 3}
+)")});
+  EXPECT_EQ(result["failed"], 0);
+  const client::RecordingReader recording(path("own.weft"));
+  EXPECT_EQ(recording.scene().sheets(0).textile().measured().shear_n_per_m(), 30);
+}
+
 TEST_F(ScriptTest, AnInnerLoopRepeatsStepsOnTheSameSession) {
   const auto result = ask({"script", script(R"(
 steps:

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "client/problem.h"
+#include "client/textile_file.h"
 #include "tests/support/service/service.h"
 
 namespace weft::client {
@@ -188,7 +189,8 @@ TEST(Templates, take_rows_columns_spacing_and_textile) {
   for (const TemplateInfo& info : templates()) {
     SCOPED_TRACE(info.name);
     const v1::Scene scene = make_template(
-        info.name, {.rows = 5, .columns = 6, .spacing_m = 0.07, .textile = "denim_11oz"});
+        info.name,
+        {.rows = 5, .columns = 6, .spacing_m = 0.07, .textile = textile_named("denim_11oz")});
     const v1::Sheet& sheet = only_sheet(scene);
     EXPECT_EQ(sheet.grid().rows(), 5);
     EXPECT_EQ(sheet.grid().columns(), 6);
@@ -211,7 +213,8 @@ TEST(Templates, are_accepted_by_the_server) {
   };
   for (const TemplateInfo& info : templates()) {
     expect_accepted(info.name, {});
-    expect_accepted(info.name, {.textile = "denim_11oz", .evaluator = v1::EVALUATOR_SERIES});
+    expect_accepted(info.name,
+                    {.textile = textile_named("denim_11oz"), .evaluator = v1::EVALUATOR_SERIES});
   }
   for (const double bend : {0.0, 0.1, 0.2, 0.3}) expect_accepted("paper-3", {.bend = bend});
   for (const int segments : {2, 5, 60}) expect_accepted("paper-4", {.segments = segments});
@@ -230,7 +233,8 @@ TEST(Templates, refuse_what_they_do_not_know) {
   };
   EXPECT_THAT(refusal("sail", {}), HasSubstr("paper-1"));
   EXPECT_THAT(refusal("hang", {.bend = 0.1}), HasSubstr("k_b"));
-  EXPECT_THAT(refusal("paper-3", {.textile = "denim_11oz", .bend = 0.1}), HasSubstr("k_b"));
+  EXPECT_THAT(refusal("paper-3", {.textile = textile_named("denim_11oz"), .bend = 0.1}),
+              HasSubstr("k_b"));
   for (const int count : {-1, 0, 1, 4097}) {
     EXPECT_THAT(refusal("hang", {.rows = count}), HasSubstr("4096"));
     EXPECT_THAT(refusal("flag", {.columns = count}), HasSubstr("4096"));

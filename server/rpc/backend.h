@@ -28,7 +28,7 @@ struct StreamCaller {
 };
 
 // Sessions go on for so long while a database that servers share is away.
-inline constexpr std::chrono::seconds kSharedReachTime{3};
+inline constexpr std::chrono::seconds kSharedLimitInterval{3};
 
 // What the services share. The registry goes first, while sessions can still reach the scheduler.
 // Scenes are planned on a thread of their own, so that a large one holds up no session.
@@ -53,7 +53,7 @@ struct Backend {
             [](const std::string& line) { spdlog::warn(line); },
             snapshot_after,
             static_cast<std::size_t>(limits.max_snapshots_per_session),
-            store->is_shared() ? kSharedReachTime : SessionHost::kReachTime};
+            store->is_shared() ? kSharedLimitInterval : SessionHost::kLimitInterval};
   }
 
   // The caller of a stream, or why there is none.

@@ -218,18 +218,18 @@ grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSess
     return refused(*reason, caller, id);
 
   // all that came before it is one entry of a log that is forgotten, see SessionStore::add()
-  SessionPast past;
-  past.first = 1;
+  SavedSession saved;
+  saved.first = 1;
   try {
-    past.snapshot = backend_.store->named_snapshot(source.uid(), parts->id);
+    saved.snapshot = backend_.store->named_snapshot(source.uid(), parts->id);
   } catch (const StoreError& error) {
     return errors::snapshot_damaged(request.name(), error.what());
   }
-  SessionSnapshot& snapshot = *past.snapshot;
-  snapshot.entries = past.first;
+  SessionSnapshot& snapshot = *saved.snapshot;
+  snapshot.entries = saved.first;
   snapshot.under_way.clear();
   snapshot.answers.clear();
-  past.reach.frame = snapshot.simulation.frame;
+  saved.limit.frame = snapshot.simulation.frame;
 
   if (const auto& step = snapshot.simulation.plan.step;
       step.substeps * source.particle_count() > backend_.limits.max_frame_work) {
@@ -242,9 +242,9 @@ grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSess
       make_identity(id, numerics_id(), caller.principal, backend_.limits.max_frame_work);
   const auto session =
       std::make_shared<Session>(identity, Simulation(source.scene()), backend_.host(),
-                                backend_.store->log_of(identity.uid, past.first));
+                                backend_.store->log_of(identity.uid, saved.first));
   const SessionSnapshot beginning = snapshot;
-  if (!session->restore(std::move(past)))
+  if (!session->restore(std::move(saved)))
     return errors::snapshot_damaged(request.name(), "it does not fit the scene of its session");
   if (auto status = keep(session, caller, name, &beginning); !status.ok()) return status;
   response = to_proto(*session);

@@ -95,7 +95,7 @@ void evict_sessions(Backend& backend, std::chrono::duration<double> unused) {
 }
 
 void give_away(Backend& backend, const std::shared_ptr<Session>& session) {
-  if (backend.registry.erase(session, Refusal::Why::kTaken)) ++backend.stats.given_away;
+  if (backend.registry.erase(session, Refusal::Why::kEvicted)) ++backend.stats.given_away;
 }
 
 }  // namespace weft

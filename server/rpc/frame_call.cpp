@@ -149,7 +149,7 @@ void FrameCall::read_on(Clock::duration silence) {
           errors::solver_failed(session_->status().failure, reading.progress.latest_frame));
     case Reading::Kind::kDeleted:
       return finish(errors::session_not_found(name_));
-    case Reading::Kind::kTaken:
+    case Reading::Kind::kEvicted:
       return finish(errors::wrong_replica(name_, ""));
   }
 }

@@ -30,13 +30,13 @@ void restore_session(Backend& backend, LeftSession left) {
   }
   const auto session =
       std::make_shared<Session>(identity, std::move(simulation), backend.host(),
-                                backend.store->log_of(identity.uid, left.past.entries()));
-  left.past.snapshot = backend.store->snapshot(identity.uid, left.past);
-  if (left.past.snapshot && left.past.snapshot->numerics_id != numerics_id()) {
+                                backend.store->log_of(identity.uid, left.saved.entries()));
+  left.saved.snapshot = backend.store->snapshot(identity.uid, left.saved);
+  if (left.saved.snapshot && left.saved.snapshot->numerics_id != numerics_id()) {
     spdlog::warn("{} goes on from frame {}, which numerics {} computed", session_name(identity.id),
-                 left.past.snapshot->simulation.frame, left.past.snapshot->numerics_id);
+                 left.saved.snapshot->simulation.frame, left.saved.snapshot->numerics_id);
   }
-  if (!session->restore(std::move(left.past))) {
+  if (!session->restore(std::move(left.saved))) {
     return add_damaged(backend,
                        {identity.id, identity.uid,
                         "no snapshot of it can be used, and its log does not reach back to "

@@ -108,7 +108,7 @@ grpc::Status to_status(const Refusal& refusal, const Session& session) {
       return errors::session_not_found(name);
     case Refusal::Why::kDraining:
       return errors::server_draining({{"last_frame", frame}});
-    case Refusal::Why::kTaken:
+    case Refusal::Why::kEvicted:
       return errors::wrong_replica(name, "");
     case Refusal::Why::kBusy:
       return errors::exhausted("commands", "too many calls wait for " + name, true);

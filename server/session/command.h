@@ -20,7 +20,7 @@ struct Refusal {
   enum class Why {
     kDeleted,           // the session is gone
     kDraining,          // the server is going
-    kTaken,             // another server has the session, or the store alone
+    kEvicted,           // another server has the session, or the store alone
     kBusy,              // too many commands wait
     kRunning,           // stepping needs a paused session
     kFailed,            // the solver diverged

@@ -50,7 +50,7 @@ struct LogEntry {
 };
 
 // How far frames may have been published, and which of them subscribers still need.
-struct Reach {
+struct PublishLimit {
   std::int64_t frame = 0;
   int holders = 0;  // subscribers that the session waits for
   // First frame that subscribers may want again, where there are any: it is there after a restart.
@@ -78,8 +78,8 @@ class SessionLog {
 
   virtual ~SessionLog() = default;
 
-  // Adds the entry, if any, and replaces the reach. Writes follow each other in the order of calls.
-  virtual void write(const std::optional<LogEntry>& entry, const Reach& reach,
+  // Adds the entry, if any, and replaces the limit. Writes follow each other in the order of calls.
+  virtual void write(const std::optional<LogEntry>& entry, const PublishLimit& limit,
                      const Written& written) = 0;
 
   // Takes a snapshot, if there is one, to be written in the background. False where it does not. A
@@ -100,7 +100,7 @@ class SessionLog {
 // Keeps nothing: the session ends with the process.
 class NoLog : public SessionLog {
  public:
-  void write(const std::optional<LogEntry>& /*entry*/, const Reach& /*reach*/,
+  void write(const std::optional<LogEntry>& /*entry*/, const PublishLimit& /*limit*/,
              const Written& written) override {
     written({});
   }

@@ -13,13 +13,16 @@
 #include <vector>
 
 #include "core/simulation.h"
+#include "server/session/audience.h"
 #include "server/session/command.h"
-#include "server/session/history.h"
-#include "server/session/log.h"
+#include "server/session/command_queue.h"
+#include "server/session/journal.h"
+#include "server/session/run.h"
 #include "server/session/scheduler.h"
 #include "server/session/snapshot.h"
 #include "server/session/stats.h"
 #include "server/session/subscription.h"
+#include "server/session/timeline.h"
 
 namespace weft {
 
@@ -52,11 +55,11 @@ struct SessionStatus {
   std::chrono::duration<double> lateness{};  // of the newest frame, where it runs at a pace
 };
 
-// What a session did before, in another process.
-struct SessionPast {
+// What an earlier process left of a session.
+struct SavedSession {
   std::vector<LogEntry> log;
-  Reach reach;
-  // At most at reach.history_from, or as early as there is one.
+  PublishLimit limit;
+  // At most at limit.history_from, or as early as there is one.
   std::optional<SessionSnapshot> snapshot = {};
   std::int64_t first = 0;                 // entries that were forgotten before those of `log`
   std::vector<NamedSnapshot> named = {};  // in order of frame
@@ -80,8 +83,8 @@ struct SessionHost {
   std::size_t max_snapshots = 16;  // on demand
   // The log is not told more often how far frames may be published, and the session goes on for
   // about as long without an answer.
-  static constexpr std::chrono::duration<double> kReachTime{0.5};
-  std::chrono::duration<double> reach_time = kReachTime;
+  static constexpr std::chrono::duration<double> kLimitInterval{0.5};
+  std::chrono::duration<double> limit_interval = kLimitInterval;
   // Frames that all subscribers had taken longer ago are not there any more after a restart.
   std::chrono::duration<double> return_time{60};
 };
@@ -91,8 +94,6 @@ struct SessionHost {
 // public methods are thread-safe.
 class Session : public Task, public std::enable_shared_from_this<Session> {
  public:
-  // Commands that may wait; more are refused (kBusy).
-  static constexpr std::size_t kMaxCommands = 256;
   // Answers that are remembered, for those who send a named request again.
   static constexpr std::size_t kMaxAnswers = 1000;
   // How long a session that sleeps without a goal and a stream goes on after somebody looked.
@@ -108,7 +109,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   // Computes again what there was since the snapshot, or since frame 0, before any command is
   // carried out, then goes on as it was. False, and nothing done, where the log does not reach back
   // that far. Called at most once, first.
-  [[nodiscard]] bool restore(SessionPast past);
+  [[nodiscard]] bool restore(SavedSession saved);
 
   const SessionIdentity& identity() const { return identity_; }
   const std::string& id() const { return identity_.id; }
@@ -151,40 +152,29 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
  private:
   friend class Subscription;
 
-  struct Step {
-    StepCommand command;
-    std::optional<std::int64_t> first;  // frame; absent: not begun
-  };
-  struct Run {
-    std::optional<double> time_scale;
-    std::optional<std::int64_t> until_frame;
-    bool until_rest = false;
-    Clock::time_point start_time;  // of the pace, when the frame was start_frame
-    std::int64_t start_frame = 0;
-  };
-  // Writes to the log that are under way.
-  struct Writing {
-    // Of an entry, or a snapshot on demand; the session waits for it.
-    std::function<void(const std::string& error)> then;
-    std::optional<std::string> written;  // its outcome
-    bool reach = false;                  // of the reach alone
-  };
-  // What is left of a past to be computed again.
+  // What an earlier process left to be computed again.
   struct Restoring {
     std::deque<LogEntry> log;
     std::int64_t frame = 0;  // as far as frames may have been published
   };
-  // Subscribers of the past that may come back.
-  struct PastHolders {
-    int count = 0;
-    std::int64_t held_from = 0;
-    Clock::time_point until;
-  };
 
-  // on the scheduler's thread
+  // A slice: what is done between two frames, then a frame or a part of one. session.cpp
   bool settle();
   bool settle_writing();
-  bool settle_restoring();
+  bool settle_steps();
+  bool go_on_with_frame();
+  bool frame_unwanted() const;
+  void compute_frame(Clock::time_point due);
+  void end_frame(FramePart part, Clock::time_point due);
+  std::vector<Repair> publish_repairs();
+  void write_limit();
+  void fail(const std::string& why);
+  std::optional<Clock::time_point> next_due();
+  std::optional<Clock::time_point> due_time();
+  bool idle();
+  void offer_to_all();
+
+  // Commands: checked, written, carried out, answered. session_commands.cpp
   bool execute_command();
   bool answer_again(Command& command);
   void answer(const Request& request, const Done& done, const Outcome& outcome);
@@ -196,96 +186,67 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   void execute(KeepSnapshot command);
   std::optional<Refusal> refusal_of(const KeepSnapshot& command) const;
   void enter(const KeepSnapshot& command, const NamedSnapshot& made, const std::string& error);
-  bool settle_steps();
   void begin_step();
   void end_step();
   void write(const Request& request, const Event& event,
              std::function<void(const std::string&)> then);
   void carry_out(const Request& request, const Done& done, const Event& event);
-  void write_reach();
-  void apply_again(const LogEntry& entry);
   Outcome apply(const Event& event);  // but steps
   Outcome apply(const RunBegun& run);
-  Outcome pause();
   Outcome apply(const TextileSet& change);
   Outcome apply(const Acted& acted);
+  Outcome pause();
+
+  // Snapshots, and what they and the log are for. session_recovery.cpp
+  bool settle_restoring();
+  void apply_again(const LogEntry& entry);
   void let_go_of_streams();
-  void compute_frame(Clock::time_point due);
-  void end_frame(FramePart part, Clock::time_point due);
-  bool snapshot_due() const;
-  bool log_grew() const;
+  bool begin_at(const SavedSession& saved);
   void offer_snapshot();
   std::shared_ptr<const SessionSnapshot> snapshot() const;
-  bool begin_at(const SessionSnapshot& from, const SessionPast& past);
-  bool go_on_with_frame();
-  bool frame_unwanted() const;
-  FramePart advance_frame();
-  void count_frame(std::chrono::duration<double> time);
-  std::vector<Repair> take_repairs();
-  void fail(const std::string& why);
-  std::optional<Clock::time_point> next_due();
-  std::optional<Clock::time_point> due_time();
-  bool idle();
-  bool unattended() const;
-  std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs) const;
 
   // with the mutex held
-  std::int64_t latest() const { return history_.latest()->number; }
+  std::int64_t latest() const { return audience_.latest(); }
   void set_state(SessionState state);
-  bool reached(const Run& run) const;
-  bool steps_begun() const { return !steps_.empty() && steps_.front().first; }
+  bool active() const { return run_ || queue_.step_begun() || restoring_; }
+  bool unattended() const;
   std::int64_t goal() const;
-  Reach reach_to(std::int64_t frame);
-  std::int64_t wanted_from();
-  std::int64_t reach_after(const Event& event) const;
-  std::int64_t ahead_of(std::optional<double> time_scale) const;
-  bool reach_suffices();
-  int holders();
-  void forget_past_holders();
-  int recorders() const;
-  bool has_readers() const;
-  int readers() const;
-  std::int64_t first_held_frame();
-  bool must_hold();
-  std::int64_t first_wanted_by(SlowReader policy) const;
+  std::int64_t limit_after(const Event& event) const;
+  bool release();
   Progress progress() const;
   Refusal refuse(Refusal::Why why, std::vector<Problem> problems = {}) const {
     return {why, latest(), std::move(problems), {}, {}};
   }
   std::optional<Refusal> refusal_of_change() const;
-  bool active() const { return run_ || steps_begun() || restoring_; }
   Applied applied(std::int64_t frame) const;
-  std::optional<Outcome> settle(const Step& step) const;
+  std::optional<Outcome> outcome_of(const CommandQueue::Step& step) const;
 
   // of subscriptions
-  Reading read(Subscription& subscription, bool frame_wanted);
-  void unsubscribe(const Subscription& subscription);
-  bool release();  // with the mutex held
-  void offer_to_all();
+  Reading read(FrameReader& reader, bool frame_wanted);
+  void unsubscribe(const FrameReader& reader);
 
   const SessionIdentity identity_;
   Scheduler& scheduler_;
   Stats& stats_;
   const std::unique_ptr<SessionLog> log_;
   const Notify notify_;
-  Simulation simulation_;                  // touched by the slice only
-  Answers<Outcome> answers_{kMaxAnswers};  // touched by the slice only
-  std::int64_t entries_ = 0;               // of the log, carried out; touched by the slice only
+  const std::size_t max_snapshots_;
+
+  // One thread at a time runs a slice (Task); what only slices touch needs no lock.
+  Timeline timeline_;
+  Answers<Outcome> answers_{kMaxAnswers};
+
   const Scene scene_;
   const std::int64_t particle_count_;
   std::atomic<int> hands_ = 0;
-  const std::chrono::duration<double> snapshot_after_;
-  std::chrono::duration<double> work_{};  // since the last snapshot; touched by the slice only
-  std::chrono::duration<double> frame_work_{};  // of the frame under way; touched by the slice only
-  std::int64_t entries_in_snapshot_ = 0;        // the last one; touched by the slice only
-  const std::size_t max_snapshots_;
-  const std::chrono::duration<double> reach_interval_;
-  const std::chrono::duration<double> return_time_;
 
-  mutable std::mutex mutex_;  // guards all below
-  std::deque<Command> commands_;
-  std::deque<Step> steps_;
-  std::optional<Run> run_;
+  // Guards all below. Held for moments: nothing is computed, written or called back under it.
+  mutable std::mutex mutex_;
+  CommandQueue queue_;
+  Journal journal_;
+  Audience audience_;
+  std::optional<ActiveRun> run_;
+  std::optional<Restoring> restoring_;
   std::optional<Refusal::Why> closed_;
   SessionState state_ = SessionState::kPaused;
   std::uint64_t state_changes_ = 0;
@@ -295,26 +256,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   std::vector<Repair> repairs_;
   std::chrono::duration<double> lateness_{};
   double frame_share_ = 0;  // of the frame under way
-  History history_;
-  std::vector<Subscription*> subscriptions_;
-  bool held_ = false;  // idle until somebody comes, or a subscriber reads on
+  bool held_ = false;       // idle until somebody comes, or a subscriber reads on
   Clock::time_point looked_at_;
   Clock::time_point used_ = Clock::now();  // a call, a frame, the end of a stream
-  std::vector<NamedSnapshot> named_;       // in order of frame
-  Writing writing_;
-  Reach reach_;  // as it was written last
-  static constexpr std::int64_t kLeastAhead = 8, kMostAhead = 16'384;
-  std::int64_t ahead_ = 16;       // frames that the reach is put ahead, or more
-  Clock::time_point reach_time_;  // when it was
-  std::optional<Restoring> restoring_;
-  std::optional<PastHolders> past_holders_;
-  Clock::time_point readers_until_;  // those of the past may come back until then
-  int past_readers_ = 0;             // that have not
-  struct Taken {
-    Clock::time_point time;
-    std::int64_t next;  // the first frame that not all of them had taken
-  };
-  std::deque<Taken> taken_;  // within the return time, the newest last
 };
 
 }  // namespace weft

@@ -27,6 +27,8 @@ struct SessionSnapshot {
 };
 
 // "frame-120"
-std::string default_snapshot_id(std::int64_t frame);
+inline std::string default_snapshot_id(std::int64_t frame) {
+  return "frame-" + std::to_string(frame);
+}
 
 }  // namespace weft

@@ -24,6 +24,13 @@ class FrameSink {
   virtual void offer() = 0;
 };
 
+// Who reads frames, and where it is.
+struct FrameReader {
+  std::weak_ptr<FrameSink> sink;
+  std::int64_t next = 0;  // frame
+  SlowReader policy = SlowReader::kDisconnect;
+};
+
 // Where a session stands.
 struct Progress {
   std::int64_t oldest_frame = 0;
@@ -42,7 +49,7 @@ struct Reading {
     kExpired,  // the next frame is no longer kept
     kFailed,   // there will be no next frame
     kDeleted,
-    kTaken,  // by another server, or the store alone
+    kEvicted,  // to another server, or the store alone
   };
   Kind kind = Kind::kNothingYet;
   std::shared_ptr<const Frame> frame;  // of kFrame
@@ -54,8 +61,7 @@ struct Reading {
 // that waits for it. Thread-safe.
 class Subscription {
  public:
-  Subscription(std::shared_ptr<Session> session, std::weak_ptr<FrameSink> sink, std::int64_t next,
-               SlowReader policy);
+  Subscription(std::shared_ptr<Session> session, FrameReader reader);
   ~Subscription();
   Subscription(const Subscription&) = delete;
   Subscription& operator=(const Subscription&) = delete;
@@ -70,9 +76,7 @@ class Subscription {
  private:
   friend class Session;
   std::shared_ptr<Session> session_;
-  std::weak_ptr<FrameSink> sink_;
-  std::int64_t next_;  // frame; guarded by the session
-  SlowReader policy_;
+  FrameReader reader_;  // guarded by the session
 };
 
 }  // namespace weft

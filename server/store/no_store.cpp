@@ -22,7 +22,7 @@ class NoStore final : public SessionStore {
     return *found->second;
   }
   std::optional<SessionSnapshot> snapshot(const std::string& /*uid*/,
-                                          const SessionPast& /*past*/) override {
+                                          const SavedSession& /*saved*/) override {
     return std::nullopt;
   }
   std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t /*entries*/) override {

@@ -59,8 +59,8 @@ class PostgresStore final : public SessionStore {
     return snapshots_.read(uid, id);
   }
   std::optional<SessionSnapshot> snapshot(const std::string& uid,
-                                          const SessionPast& past) override {
-    return snapshots_.read(uid, past.reach.history_from, past.first);
+                                          const SavedSession& saved) override {
+    return snapshots_.read(uid, saved.limit.history_from, saved.first);
   }
   std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t entries) override;
   void erase(const std::string& uid, const Request& deletion,
@@ -159,7 +159,7 @@ void PostgresStore::add(const KeptSession& session, const Request& creation,
   records::Progress come;
   if (beginning != nullptr) {
     come.entries = beginning->entries;
-    come.reach.frame = beginning->simulation.frame;
+    come.limit.frame = beginning->simulation.frame;
   }
   const std::string record = records::encode(session), progress = records::encode(come);
   calls_.run([&](pqxx::work& transaction) {
@@ -208,16 +208,16 @@ class PostgresStore::Log final : public SessionLog {
   Log(PostgresStore& store, std::string uid, std::int64_t entries)
       : store_(store), uid_(std::move(uid)), entries_(std::make_shared<std::int64_t>(entries)) {}
 
-  void write(const std::optional<LogEntry>& entry, const Reach& reach,
+  void write(const std::optional<LogEntry>& entry, const PublishLimit& limit,
              const Written& written) override {
     // the count is the writing thread's own
     const auto record = entry ? std::optional(records::encode(*entry)) : std::nullopt;
     store_.post(
         uid_,
-        [record, reach, uid = uid_, tenure = store_.tenures_.of(uid_),
+        [record, limit, uid = uid_, tenure = store_.tenures_.of(uid_),
          entries = entries_](pqxx::work& transaction) {
           const std::string progress =
-              records::encode(records::Progress{*entries + (record ? 1 : 0), reach});
+              records::encode(records::Progress{*entries + (record ? 1 : 0), limit});
           const bool own =
               transaction
                   .exec_prepared("progress", uid, tenure.owner, tenure.epoch, binary(progress),
@@ -357,7 +357,7 @@ Claim PostgresStore::claim(const std::string& id) {
   if (uid.empty()) return claim;
   tenures_.set(uid, tenure);
   if (auto* left = std::get_if<LeftSession>(&claim))
-    left->past.named = snapshots_.named(uid, left->past.entries());
+    left->saved.named = snapshots_.named(uid, left->saved.entries());
   return claim;
 }
 

@@ -127,10 +127,10 @@ std::string encode(const KeptSession& session) {
 std::string encode(const Progress& progress) {
   stored::KeptProgress to;
   to.set_entries(progress.entries);
-  to.set_frame(progress.reach.frame);
-  to.set_holders(progress.reach.holders);
-  if (progress.reach.history_from) to.set_history_from(*progress.reach.history_from);
-  to.set_readers(progress.reach.readers);
+  to.set_frame(progress.limit.frame);
+  to.set_holders(progress.limit.holders);
+  if (progress.limit.history_from) to.set_history_from(*progress.limit.history_from);
+  to.set_readers(progress.limit.readers);
   return to.SerializeAsString();
 }
 
@@ -153,8 +153,8 @@ KeptSession decode_session(const std::string& bytes) {
 Progress decode_progress(const std::string& bytes) {
   const auto from = parse<stored::KeptProgress>(bytes);
   Progress progress{from.entries(), {from.frame(), from.holders()}};
-  if (from.has_history_from()) progress.reach.history_from = from.history_from();
-  progress.reach.readers = from.readers();
+  if (from.has_history_from()) progress.limit.history_from = from.history_from();
+  progress.limit.readers = from.readers();
   return progress;
 }
 
@@ -191,13 +191,13 @@ LeftSession assemble(const std::string& uid, const std::string& id, const Row& s
   if (progress.checksum != checksum(uid, progress.record))
     throw StoreError("the checksum of how far it came is wrong");
   const Progress come = decode_progress(progress.record);
-  left.past.reach = come.reach;
+  left.saved.limit = come.limit;
 
   // where the first ones are missing for another reason than that they were forgotten, no snapshot
   // will fit
   std::int64_t next = entries.empty() ? come.entries : entries.front().number;
-  left.past.first = next;
-  auto& log = left.past.log;
+  left.saved.first = next;
+  auto& log = left.saved.log;
   for (const NumberedRow& row : entries) {
     if (row.number != next || row.checksum != checksum(entry_key(uid, next), row.record)) {
       throw StoreError("entry " + std::to_string(next) +

@@ -16,7 +16,7 @@ namespace weft::records {
 
 struct Progress {
   std::int64_t entries = 0;
-  Reach reach;
+  PublishLimit limit;
 };
 
 std::string encode(const KeptSession& session);

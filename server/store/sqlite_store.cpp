@@ -93,8 +93,8 @@ class SqliteStore final : public SessionStore {
 
   LeftBehind load() override;
   std::optional<SessionSnapshot> snapshot(const std::string& uid,
-                                          const SessionPast& past) override {
-    return snapshots_.read(uid, past.reach.history_from, past.first);
+                                          const SavedSession& saved) override {
+    return snapshots_.read(uid, saved.limit.history_from, saved.first);
   }
   void add(const KeptSession& session, const Request& creation,
            const SessionSnapshot* beginning) override;
@@ -215,7 +215,7 @@ LeftSession SqliteStore::load_session(const std::string& uid, const std::string&
         {{blob(row.getColumn(1)), row.getColumn(2).getInt64()}, row.getColumn(0).getInt64()});
   }
   LeftSession left = records::assemble(uid, id, session, progress, entries);
-  left.past.named = snapshots_.named(uid, left.past.entries());
+  left.saved.named = snapshots_.named(uid, left.saved.entries());
   return left;
 }
 
@@ -231,7 +231,7 @@ void SqliteStore::add(const KeptSession& session, const Request& creation,
   if (beginning != nullptr) {
     snapshots_.begin(uid, *beginning);
     come.entries = beginning->entries;
-    come.reach.frame = beginning->simulation.frame;
+    come.limit.frame = beginning->simulation.frame;
   }
   carry_out([&, record = records::encode(session),
              progress = records::encode(come)](SQLite::Database& database) {
@@ -285,13 +285,13 @@ class SqliteStore::Log final : public SessionLog {
   Log(SqliteStore& store, std::string uid, std::int64_t entries)
       : store_(store), uid_(std::move(uid)), entries_(std::make_shared<std::int64_t>(entries)) {}
 
-  void write(const std::optional<LogEntry>& entry, const Reach& reach,
+  void write(const std::optional<LogEntry>& entry, const PublishLimit& limit,
              const Written& written) override {
     // the count is the writing thread's own
     const auto record = entry ? std::optional(records::encode(*entry)) : std::nullopt;
     store_.post(
-        [record, reach, uid = uid_, entries = entries_](SQLite::Database& database) {
-          const records::Progress progress{*entries + (record ? 1 : 0), reach};
+        [record, limit, uid = uid_, entries = entries_](SQLite::Database& database) {
+          const records::Progress progress{*entries + (record ? 1 : 0), limit};
           if (replace(database, uid, records::encode(progress)) && record) {
             add(database, uid, *entries, *record);
           }

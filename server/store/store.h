@@ -23,7 +23,7 @@ struct KeptSession {
 // A session that an earlier process left.
 struct LeftSession {
   KeptSession session;
-  SessionPast past;
+  SavedSession saved;
 };
 
 // One whose data cannot be trusted.
@@ -97,11 +97,11 @@ class SessionStore {
   // A snapshot that was kept on demand. Throws StoreError where it is missing or damaged.
   virtual SessionSnapshot named_snapshot(const std::string& uid, const std::string& id) = 0;
 
-  // The newest sound snapshot of a session at most at the frame of its reach's history, if there is
+  // The newest sound snapshot of a session at most at the frame of its limit's history, if there is
   // one; else, where its log does not reach back to frame 0, the oldest sound one after that. What
   // is newer is removed.
   virtual std::optional<SessionSnapshot> snapshot(const std::string& uid,
-                                                  const SessionPast& past) = 0;
+                                                  const SavedSession& saved) = 0;
 
   // Where the session's log goes on after so many entries. The store outlives it.
   virtual std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t entries) = 0;

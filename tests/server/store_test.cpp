@@ -553,11 +553,11 @@ class RestartWithLongLogs : public RestartWithSnapshots {
   }
 
   // The log of the only session, when its server is gone.
-  SessionPast past() {
+  SavedSession saved() {
     service_.reset();
     auto left = open_sqlite_store(directory_.name())->load();
     EXPECT_THAT(left.sessions, SizeIs(1));
-    return std::move(left.sessions.at(0).past);
+    return std::move(left.sessions.at(0).saved);
   }
   // Adds 1200 entries to the log.
   void change_and_step(const v1::Session& session) {
@@ -586,7 +586,7 @@ TEST_F(RestartWithLongLogs, ForgetsWhatLiesBeforeTheOlderSnapshotsButNoAnswer) {
   change_and_step(session);
   kept(session);
   const std::string before = newest(session);
-  const SessionPast left = past();
+  const SavedSession left = saved();
   EXPECT_GT(left.first, 0);
   EXPECT_LT(left.log.size(), 400);
   EXPECT_GT(left.first + static_cast<std::int64_t>(left.log.size()), 1200);
@@ -618,7 +618,7 @@ TEST_F(RestartWithLongLogs, GivesTheFramesOfAServerThatWasLeftAlone) {
   restart();
   change_and_step(session);
   const std::string after = newest(session);
-  EXPECT_GT(past().first, 1000);
+  EXPECT_GT(saved().first, 1000);
   start();
   service_->erase(session);
   history_bytes_ = 64 << 20;
@@ -635,7 +635,7 @@ TEST_F(RestartWithLongLogs, ForgetsCallsOfASessionThatStandsStill) {
   for (int i = 0; i < 2100; ++i) service_->pause(session);
   set_preset(session, "denim_11oz");
   const std::string before = service_->get(session).SerializeAsString();
-  const SessionPast left = past();
+  const SavedSession left = saved();
   EXPECT_LE(left.log.size(), 1100);
   EXPECT_EQ(left.first + static_cast<std::int64_t>(left.log.size()), 2101);
   start();

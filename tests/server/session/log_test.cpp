@@ -18,7 +18,7 @@ using ::testing::SizeIs;
 struct Disk {
   std::mutex mutex;
   std::vector<LogEntry> entries;
-  Reach reach;
+  PublishLimit limit;
   std::string error;  // of every write
   bool slow = false;
   std::vector<std::function<void()>> waiting;  // writes that take their time
@@ -27,14 +27,14 @@ struct Disk {
   std::atomic<int> offers = 0;  // of snapshots
   std::function<void()> before_snapshot;
 
-  SessionPast past() {
+  SavedSession saved() {
     std::lock_guard lock(mutex);
-    SessionPast past{entries, reach};
+    SavedSession saved{entries, limit};
     for (const auto& snapshot : snapshots) {
-      if (!reach.history_from || snapshot->simulation.frame <= *reach.history_from)
-        past.snapshot = *snapshot;
+      if (!limit.history_from || snapshot->simulation.frame <= *limit.history_from)
+        saved.snapshot = *snapshot;
     }
-    return past;
+    return saved;
   }
   void fail(const std::string& why) {
     std::lock_guard lock(mutex);
@@ -43,7 +43,7 @@ struct Disk {
   std::int64_t begun() {  // waits for a write; how far frames may go once it has finished
     for (;;) {
       std::lock_guard lock(mutex);
-      if (!waiting.empty()) return reach.frame;
+      if (!waiting.empty()) return limit.frame;
     }
   }
   void hurry() {
@@ -71,7 +71,7 @@ class DiskLog : public SessionLog {
  public:
   explicit DiskLog(std::shared_ptr<Disk> disk) : disk_(std::move(disk)) {}
 
-  void write(const std::optional<LogEntry>& entry, const Reach& reach,
+  void write(const std::optional<LogEntry>& entry, const PublishLimit& limit,
              const Written& written) override {
     std::string error;
     {
@@ -79,7 +79,7 @@ class DiskLog : public SessionLog {
       error = disk_->error;
       if (error.empty()) {
         if (entry) disk_->entries.push_back(*entry);
-        disk_->reach = reach;
+        disk_->limit = limit;
       }
       if (disk_->slow) {
         disk_->waiting.emplace_back([written, error] { written(error); });
@@ -138,13 +138,13 @@ class SessionLogTest : public ::testing::Test {
     return make(disk, often);
   }
   // The session that another process would have.
-  std::shared_ptr<Session> restored(const SessionPast& past) {
+  std::shared_ptr<Session> restored(const SavedSession& saved) {
     const auto session = make(std::make_shared<Disk>());
-    EXPECT_TRUE(session->restore(past));
+    EXPECT_TRUE(session->restore(saved));
     return session;
   }
-  std::shared_ptr<Session> restored_and_paused(const SessionPast& past) {
-    const auto session = restored(past);
+  std::shared_ptr<Session> restored_and_paused(const SavedSession& saved) {
+    const auto session = restored(saved);
     pause(*session).applied();
     return session;
   }
@@ -174,7 +174,7 @@ TEST_F(SessionLogTest, HasACallBeforeItIsCarriedOut) {
   disk_->slow = true;
   const auto session = make(disk_);
   Answer answer = run(*session, 3);
-  while (disk_->past().log.empty()) std::this_thread::yield();
+  while (disk_->saved().log.empty()) std::this_thread::yield();
   EXPECT_FALSE(answer.is_there());
   EXPECT_EQ(session->status().state, SessionState::kPaused);
   disk_->finish();
@@ -210,9 +210,9 @@ TEST_F(SessionLogTest, SaysHowFarFramesGoBeforeTheyArePublished) {
   run(*session, 3000).applied();
   for (int i = 0; i <= 3000; ++i) {
     const std::int64_t frame = watcher->read().frame->number;
-    ASSERT_LE(frame, disk_->past().reach.frame);
+    ASSERT_LE(frame, disk_->saved().limit.frame);
   }
-  EXPECT_EQ(disk_->past().reach.frame, 3000);
+  EXPECT_EQ(disk_->saved().limit.frame, 3000);
 }
 
 TEST_F(SessionLogTest, SaysOfARunAtAPaceNoMoreThanThatHoweverFastTheSessionWas) {
@@ -224,19 +224,19 @@ TEST_F(SessionLogTest, SaysOfARunAtAPaceNoMoreThanThatHoweverFastTheSessionWas) 
   RunCommand command;
   command.time_scale = 1e-3;  // a frame in 17 s
   Answer(*session, command).applied();
-  EXPECT_LE(disk_->past().reach.frame, 3008);
+  EXPECT_LE(disk_->saved().limit.frame, 3008);
 }
 
 TEST_F(SessionLogTest, StandsStillWhereTheDiskDoesNotYetSayHowFarFramesGo) {
   const auto session = make(disk_), other = make(std::make_shared<Disk>());
   disk_->slow = true;
   auto running = run(*session, 3000);
-  const std::int64_t reach = disk_->begun();
-  ASSERT_LT(reach, 3000);
+  const std::int64_t limit = disk_->begun();
+  ASSERT_LT(limit, 3000);
   disk_->finish();
   running.applied();
   step(*other, 1000).applied();  // takes its time
-  EXPECT_LE(session->status().newest->number, reach);
+  EXPECT_LE(session->status().newest->number, limit);
   disk_->hurry();
   const auto watcher = Watcher::of(*session, 0);
   while (watcher->read().frame->number < 3000) {
@@ -252,7 +252,7 @@ TEST_F(SessionLogTest, GivesTheSameFramesAgain) {
   watcher->wait_for_frame(30);
   Answer(*session, bend(4e-5)).applied();
   watcher->wait_for_frame(60);
-  const auto again = restored_and_paused(disk_->past());
+  const auto again = restored_and_paused(disk_->saved());
   const auto frame = session->status().newest, same = again->status().newest;
   ASSERT_EQ(same->number, frame->number);
   EXPECT_EQ(same->positions, frame->positions);
@@ -261,10 +261,10 @@ TEST_F(SessionLogTest, GivesTheSameFramesAgain) {
 
 // Frames that may have been seen come before any call.
 TEST_F(SessionLogTest, LetsNoCallChangeAFrameThatMayHaveBeenPublished) {
-  SessionPast past;
-  past.log.push_back({0, {}, RunBegun{1e-3, std::nullopt, false}});
-  past.reach.frame = 40;
-  const auto session = restored(past);
+  SavedSession saved;
+  saved.log.push_back({0, {}, RunBegun{1e-3, std::nullopt, false}});
+  saved.limit.frame = 40;
+  const auto session = restored(saved);
   EXPECT_EQ(Answer(*session, bend(3e-5)).applied().frame, 41);
 }
 
@@ -272,7 +272,7 @@ TEST_F(SessionLogTest, KnowsTheAnswersToNamedCalls) {
   const auto session = make(disk_);
   const Applied first = Answer(*session, named_step(5, "a")).applied();
   step(*session, 2).applied();
-  const auto again = restored(disk_->past());
+  const auto again = restored(disk_->saved());
   const Applied same = Answer(*again, named_step(5, "a")).applied();
   EXPECT_EQ(same.frame, first.frame);
   EXPECT_EQ(same.newest, first.newest);
@@ -281,10 +281,10 @@ TEST_F(SessionLogTest, KnowsTheAnswersToNamedCalls) {
 }
 
 TEST_F(SessionLogTest, FinishesAStepThatHadBegun) {
-  SessionPast past;
-  past.log.push_back({0, {"a", 1}, StepsBegun{50}});
-  past.reach.frame = 10;
-  const auto session = restored(past);
+  SavedSession saved;
+  saved.log.push_back({0, {"a", 1}, StepsBegun{50}});
+  saved.limit.frame = 10;
+  const auto session = restored(saved);
   EXPECT_EQ(Answer(*session, named_step(50, "a")).applied().newest, 50);
 }
 
@@ -301,8 +301,8 @@ TEST_F(SessionLogTest, EndsAStepWhoseCallerWentAway) {
   session->wake();
   EXPECT_EQ(answer.refused(), Refusal::Why::kCancelled);
   const std::int64_t newest = session->status().newest->number;
-  ASSERT_THAT(disk_->past().log, SizeIs(2));
-  const auto again = restored(disk_->past());
+  ASSERT_THAT(disk_->saved().log, SizeIs(2));
+  const auto again = restored(disk_->saved());
   EXPECT_EQ(step(*again, 1).applied().frame, newest + 1);
 }
 
@@ -332,10 +332,10 @@ TEST_F(SessionLogTest, WithASnapshotComputesOnlyWhatCameAfterIt) {
   Answer(*session, bend(3e-5)).applied();
   step(*session, 100).applied();
   Answer(*session, bend(4e-5)).applied();
-  const SessionPast past = disk_->past();
-  ASSERT_TRUE(past.snapshot);
+  const SavedSession saved = disk_->saved();
+  ASSERT_TRUE(saved.snapshot);
   std::shared_ptr<Session> again;
-  EXPECT_EQ(computed_by([&] { again = restored_and_paused(past); }), 0);
+  EXPECT_EQ(computed_by([&] { again = restored_and_paused(saved); }), 0);
   for (int i = 0; i < 20; ++i) {
     expect_equal(*again, *session);
     step(*again, 1).applied();
@@ -361,13 +361,13 @@ TEST_F(SessionLogTest, GivesTheSameFramesAndAnswersFromEverySnapshot) {
   watcher->wait_for_frame(*to_goal.until_frame);
   pause(*session).applied();
   const auto frames = session->status().newest->number;
-  SessionPast past = disk_->past();
+  SavedSession saved = disk_->saved();
   ASSERT_EQ(static_cast<std::int64_t>(disk_->snapshots.size()), frames);
   for (const auto& snapshot : disk_->snapshots) {
     SCOPED_TRACE(snapshot->simulation.frame);
-    past.snapshot = *snapshot;
+    saved.snapshot = *snapshot;
     std::shared_ptr<Session> again;
-    EXPECT_EQ(computed_by([&] { again = restored_and_paused(past); }),
+    EXPECT_EQ(computed_by([&] { again = restored_and_paused(saved); }),
               frames - snapshot->simulation.frame);
     expect_equal(*again, *session);
     EXPECT_EQ(Answer(*again, named_step(10, "step")).applied().time, stepped.time);
@@ -386,7 +386,7 @@ TEST_F(SessionLogTest, TakesASnapshotAfterManyCalls) {
   pause(*session).applied();
   pause(*session).applied();  // after it
   ASSERT_EQ(disk_->offers, 1);
-  EXPECT_EQ(disk_->past().snapshot->entries, 500);
+  EXPECT_EQ(disk_->saved().snapshot->entries, 500);
 }
 
 TEST_F(SessionLogTest, SaysThatThereIsASnapshotOnceThatIsWritten) {
@@ -397,14 +397,14 @@ TEST_F(SessionLogTest, SaysThatThereIsASnapshotOnceThatIsWritten) {
   EXPECT_THAT(session->snapshots(), SizeIs(0));
   disk_->fail("");
   EXPECT_EQ(Answer(*session, KeepSnapshot{"a", {"name", 1}, {}}).applied().newest, 3);
-  const SessionPast past = disk_->past();
-  ASSERT_THAT(past.log, SizeIs(2));
-  EXPECT_EQ(std::get<SnapshotKept>(past.log.back().event).id, "a");
+  const SavedSession saved = disk_->saved();
+  ASSERT_THAT(saved.log, SizeIs(2));
+  EXPECT_EQ(std::get<SnapshotKept>(saved.log.back().event).id, "a");
   EXPECT_EQ(disk_->named.at("a")->entries, 1);
   ASSERT_THAT(session->snapshots(), SizeIs(1));
   EXPECT_EQ(session->snapshots().front().frame, 3);
   // a restart knows the answer, and takes none again
-  const auto again = restored(past);
+  const auto again = restored(saved);
   EXPECT_EQ(Answer(*again, KeepSnapshot{"a", {"name", 1}, {}}).applied().newest, 3);
 }
 
@@ -413,14 +413,14 @@ TEST_F(SessionLogTest, NeedsASnapshotWhereItsBeginningWasForgotten) {
   step(*session, 20).applied();
   Answer(*session, bend(3e-5)).applied();
   step(*session, 10).applied();
-  SessionPast past = disk_->past();
-  past.log.erase(past.log.begin(), past.log.begin() + 2);
-  past.first = 2;
-  expect_equal(*restored_and_paused(past), *session);
-  past.snapshot->entries = 1;
-  EXPECT_FALSE(make(std::make_shared<Disk>())->restore(past));
-  past.snapshot.reset();
-  EXPECT_FALSE(make(std::make_shared<Disk>())->restore(past));
+  SavedSession saved = disk_->saved();
+  saved.log.erase(saved.log.begin(), saved.log.begin() + 2);
+  saved.first = 2;
+  expect_equal(*restored_and_paused(saved), *session);
+  saved.snapshot->entries = 1;
+  EXPECT_FALSE(make(std::make_shared<Disk>())->restore(saved));
+  saved.snapshot.reset();
+  EXPECT_FALSE(make(std::make_shared<Disk>())->restore(saved));
 }
 
 TEST_F(SessionLogTest, WithASnapshotGivesReadersTheFramesThatTheyHad) {
@@ -431,7 +431,7 @@ TEST_F(SessionLogTest, WithASnapshotGivesReadersTheFramesThatTheyHad) {
   pause(*session).applied();
   const std::int64_t oldest = watcher->subscription().progress().oldest_frame;
   ASSERT_GT(oldest, 200);
-  const auto again = restored(disk_->past());
+  const auto again = restored(disk_->saved());
   const auto reader = Watcher::of(*again, oldest);
   for (std::int64_t frame = oldest; frame <= 300; ++frame) {
     ASSERT_EQ(reader->read().frame->number, frame);
@@ -451,10 +451,10 @@ TEST_F(SessionLogTest, SaysWhatReadersMayWantAgainAndNoMore) {
     while (reader->read().frame->number < 300) {
     }
     step(*session, 1).applied();
-    EXPECT_EQ(disk->past().reach.history_from, read);
+    EXPECT_EQ(disk->saved().limit.history_from, read);
     const auto slow = Watcher::of(*session, 100);
     step(*session, 1).applied();
-    EXPECT_EQ(disk->past().reach.history_from, wanted);
+    EXPECT_EQ(disk->saved().limit.history_from, wanted);
   }
 }
 
@@ -462,26 +462,26 @@ TEST_F(SessionLogTest, KnowsWhatReadersHadOnceAllOfThemAreBack) {
   const auto session = make(disk_);
   const auto one = Watcher::of(*session, 0), two = Watcher::of(*session, 0);
   step(*session, 300).applied();
-  while (disk_->past().reach.readers < 2) std::this_thread::yield();
+  while (disk_->saved().limit.readers < 2) std::this_thread::yield();
   const auto disk = std::make_shared<Disk>();
   const auto again = make(disk);
-  ASSERT_TRUE(again->restore(disk_->past()));
+  ASSERT_TRUE(again->restore(disk_->saved()));
   const auto back = Watcher::of(*again, 290);
   step(*again, 1).applied();
-  EXPECT_EQ(disk->past().reach.history_from, 0);
+  EXPECT_EQ(disk->saved().limit.history_from, 0);
   const auto later = Watcher::of(*again, 250);
   step(*again, 1).applied();
-  EXPECT_EQ(disk->past().reach.history_from, 250);
+  EXPECT_EQ(disk->saved().limit.history_from, 250);
 }
 
 TEST_F(SessionLogTest, ForgetsWhereReadersWereWhenTheyAreGone) {
   const auto session = make_kept(disk_);
   auto watcher = Watcher::of(*session, 0);
   step(*session, 30).applied();
-  EXPECT_EQ(disk_->past().reach.history_from, 0);
+  EXPECT_EQ(disk_->saved().limit.history_from, 0);
   watcher->leave();
-  while (disk_->past().reach.history_from) std::this_thread::yield();
-  EXPECT_EQ(disk_->past().snapshot->simulation.frame, 30);
+  while (disk_->saved().limit.history_from) std::this_thread::yield();
+  EXPECT_EQ(disk_->saved().snapshot->simulation.frame, 30);
 }
 
 // What a drain ends goes on after a restart.
@@ -490,15 +490,15 @@ TEST_F(SessionLogTest, HasNoSnapshotOfASessionThatIsClosed) {
   disk_->before_snapshot = [&] { session->close(Refusal::Why::kDraining); };
   run(*session).applied();
   while (disk_->offers == 0) std::this_thread::yield();
-  EXPECT_FALSE(disk_->past().snapshot);
+  EXPECT_FALSE(disk_->saved().snapshot);
 }
 
 TEST_F(SessionLogTest, WithASnapshotThatDoesNotFitComputesEverythingAgain) {
   const auto session = make_kept(disk_);
   step(*session, 30).applied();
-  SessionPast past = disk_->past();
+  SavedSession saved = disk_->saved();
   for (const int fault : {0, 1, 2}) {
-    SessionPast wrong = past;
+    SavedSession wrong = saved;
     if (fault == 0) wrong.snapshot->simulation.sheets[0].solver.pop_back();
     if (fault == 1) wrong.snapshot->entries = 5;
     if (fault == 2) wrong.snapshot->entries = 0;

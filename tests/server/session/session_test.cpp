@@ -519,7 +519,7 @@ TEST(Session, RefusesCommandsWhenTooManyWait) {
   constexpr std::size_t kBeingMoved = 1;  // neither waiting nor begun
   std::vector<Answer> accepted;
   std::optional<Answer> refused;
-  while (!refused && accepted.size() <= Session::kMaxCommands + kBeingMoved) {
+  while (!refused && accepted.size() <= CommandQueue::kMost + kBeingMoved) {
     Answer answer = step(*session, 1'000'000'000);
     if (answer.is_there()) {
       refused = answer;
@@ -529,7 +529,7 @@ TEST(Session, RefusesCommandsWhenTooManyWait) {
   }
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->refused(), Refusal::Why::kBusy);
-  EXPECT_GE(accepted.size(), Session::kMaxCommands);
+  EXPECT_GE(accepted.size(), CommandQueue::kMost);
   act(*session, {.kind = Action::Kind::kLetGo, .hand = session->new_hand()}).applied();
   session->close(Refusal::Why::kDeleted);
   EXPECT_EQ(accepted.front().refused(), Refusal::Why::kDeleted);

@@ -1,0 +1,103 @@
+#include "server/session/timeline.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "server/session/idle_threads.h"
+
+namespace weft {
+
+Timeline::Timeline(Simulation given, std::int64_t max_frame_work, Duration snapshot_after)
+    : simulation(std::move(given)), snapshot_after_(snapshot_after) {
+  if (max_frame_work > 0) simulation.limit_frame_work(max_frame_work);
+}
+
+FramePart Timeline::advance(Scheduler& scheduler) {
+  constexpr std::chrono::microseconds kSlice{20'000}, kBusySlice{200};
+  const auto begin = Clock::now();
+  const Enough enough = [&] {
+    const auto time = Clock::now() - begin;
+    return time >= kSlice || (time >= kBusySlice && scheduler.busy());
+  };
+  const int most_threads = simulation.most_threads();
+  FramePart part{};
+  if (most_threads == 1) {
+    part = simulation.advance_frame(enough);
+  } else {
+    IdleThreads pool(scheduler, most_threads);
+    part = simulation.advance_frame(enough, pool);
+  }
+  const Duration time = Clock::now() - begin;
+  work_ += time;
+  frame_work_ += time;
+  return part;
+}
+
+void Timeline::count_frame(Stats& stats) {
+  const Duration time = std::exchange(frame_work_, {});
+  ++stats.frames;
+  if (simulation.substeps() == 0) {
+    ++stats.sleeping_frames;
+    return;
+  }
+  stats.substeps += simulation.substeps();
+  stats.particle_substeps += simulation.substeps() * simulation.particle_count();
+  stats.frame_time.add(time);
+}
+
+bool Timeline::drop_frame() {
+  if (!simulation.drop_frame()) return false;
+  frame_work_ = {};
+  return true;
+}
+
+std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs) const {
+  auto frame = std::make_shared<Frame>();
+  const std::size_t values = 3 * static_cast<std::size_t>(simulation.particle_count());
+  frame->number = simulation.frame();
+  frame->time = simulation.time();
+  frame->positions.resize(values);
+  frame->velocities.resize(values);
+  simulation.copy_positions(frame->positions);
+  simulation.copy_velocities(frame->velocities);
+  frame->stats = simulation.stats();
+  frame->at_rest = simulation.at_rest();
+  frame->substeps = simulation.substeps();
+  frame->substep = simulation.plan().step.substep;
+  frame->repairs = std::move(repairs);
+  return frame;
+}
+
+std::vector<Repair> Timeline::repairs_of_frame() const {
+  const std::vector<Repair>& all = simulation.repairs();
+  std::vector<Repair> of_frame;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(of_frame),
+               [&](const Repair& repair) { return repair.frame == simulation.frame(); });
+  return of_frame;
+}
+
+// Large sessions have snapshots written more rarely.
+bool Timeline::snapshot_due() const {
+  constexpr double kParticles = 20'000;
+  return work_ > snapshot_after_ * std::max(1.0, simulation.particle_count() / kParticles);
+}
+
+// So many calls since the last snapshot that the log should not grow without one.
+bool Timeline::log_grew() const {
+  constexpr std::int64_t kManyEntries = 500;
+  return entries - entries_in_snapshot_ >= kManyEntries;
+}
+
+void Timeline::note_snapshot() {
+  work_ = {};
+  entries_in_snapshot_ = entries;
+}
+
+bool Timeline::begin_at(const SessionSnapshot& snapshot) {
+  if (!simulation.restore(snapshot.simulation)) return false;
+  entries = entries_in_snapshot_ = snapshot.entries;
+  return true;
+}
+
+}  // namespace weft

@@ -13,6 +13,7 @@
 
 #include "client/problem.h"
 #include "client/replay/player.h"
+#include "server/rpc/checks.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/frame_encoding.h"
 #include "server/rpc/textile_service.h"
@@ -94,21 +95,14 @@ class SessionReplay final : public v1::SessionService::Service {
   Status RunSession(ServerContext*, const v1::RunSessionRequest* request,
                     v1::RunSessionResponse* response) override {
     if (Status status = replay_.find(request->name()); !status.ok()) return status;
+    if (const auto problems = find_problems(*request); !problems.empty())
+      return errors::field_invalid(problems);
     Player::Run run;
-    if (request->has_time_scale()) {
-      run.time_scale = request->time_scale();
-      if (!(*run.time_scale >= 1e-3 && *run.time_scale <= 1000)) {  // NaN too
-        return errors::field_invalid(
-            "time_scale", fmt::format("{} is not within 0.001 to 1000", *run.time_scale));
-      }
-    }
+    if (request->has_time_scale()) run.time_scale = request->time_scale();
     const std::int64_t newest = player_.place().newest->number;
     if (request->has_until_frame()) {
       run.until_frame = request->until_frame();
-      if (*run.until_frame <= newest) {
-        return errors::field_invalid(
-            "until_frame", fmt::format("does not lie ahead of the newest frame, {}", newest));
-      }
+      if (*run.until_frame <= newest) return errors::not_ahead(newest);
     }
     run.until_rest = request->until_rest();
     const Player::Place place = player_.run(run);
@@ -128,21 +122,17 @@ class SessionReplay final : public v1::SessionService::Service {
   Status StepSession(ServerContext*, const v1::StepSessionRequest* request,
                      v1::StepSessionResponse* response) override {
     if (Status status = replay_.find(request->name()); !status.ok()) return status;
-    const std::int64_t frames = request->has_frames() ? request->frames() : 1;
+    if (const auto problems = find_problems(*request); !problems.empty())
+      return errors::field_invalid(problems);
+    const std::int64_t frames = frames_of(*request);
     const std::int64_t newest = player_.place().newest->number;
-    if (frames < 1) return errors::field_invalid("frames", fmt::format("{} is below 1", frames));
-    if (request->has_expected_frame() && request->expected_frame() != newest) {
-      return errors::aborted("FRAME_STALE",
-                             fmt::format("expected_frame is not the newest frame, {}", newest),
-                             {{"latest_frame", std::to_string(newest)}});
-    }
+    if (request->has_expected_frame() && request->expected_frame() != newest)
+      return errors::frame_stale(newest);
     if (frames > player_.last_frame() - newest) return replay_.ended();
     const Player::Place place = player_.step(frames);
     if (place.state == v1::SESSION_STATE_FAILED) return replay_.failed(place);
-    if (place.state == v1::SESSION_STATE_RUNNING) {
-      return errors::failed_precondition(
-          "SESSION_RUNNING", request->name() + " runs by itself; pause it before stepping");
-    }
+    if (place.state == v1::SESSION_STATE_RUNNING)
+      return errors::session_running(request->name(), newest);
     response->set_applied_frame(newest + 1);
     response->set_frame(place.newest->number);
     response->set_time_s(place.newest->time);
@@ -233,7 +223,6 @@ class FrameReplay final : public v1::FrameService::Service {
   Status ViewFrames(
       ServerContext* context,
       grpc::ServerReaderWriter<v1::ViewFramesResponse, v1::ViewFramesRequest>* stream) override {
-    constexpr int kMostCredits = 64;
     v1::ViewFramesRequest first, request;
     if (!stream->Read(&first)) return Status::OK;
     const auto header = open(first, player_.place().newest->number);
@@ -243,10 +232,8 @@ class FrameReplay final : public v1::FrameService::Service {
                                                                std::get<v1::StreamHeader>(header));
     request.set_credits(first.credits());
     do {
-      if (request.credits() < 1 || request.credits() > kMostCredits) {
-        return errors::field_invalid(
-            "credits", fmt::format("{} is not within 1 to {}", request.credits(), kMostCredits));
-      }
+      if (const auto problems = find_problems(request, 0); !problems.empty())
+        return errors::field_invalid(problems);
       for (int credit = 0; credit < request.credits(); ++credit) {
         const auto place = writing.await(next);
         if (const auto* error = std::get_if<Status>(&place)) return *error;
@@ -331,8 +318,7 @@ class FrameReplay final : public v1::FrameService::Service {
     if (Status status = replay_.find(request.session()); !status.ok()) return status;
     v1::StreamHeader header = player_.header();
     if (!request.uid().empty() && request.uid() != header.uid()) {
-      return errors::aborted("UID_CHANGED", "this name belongs to another session now",
-                             {{"uid", header.uid()}});
+      return errors::uid_changed(header.uid());
     }
     const auto newest = player_.place().newest;
     auto problems =

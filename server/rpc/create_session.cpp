@@ -118,13 +118,12 @@ grpc::Status SessionService::refusal(const Caller& caller, const v1::CreateSessi
   return reason ? refused(*reason, caller, id) : grpc::Status::OK;
 }
 
-grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessionRequest& request,
-                                    v1::Session& response) {
+// What a call that makes a session begins with: the name of the request, and the session's id. Or
+// its status, where it is refused, or was carried out before and is answered.
+template <class CreateOrRestore>
+std::variant<SessionService::Begun, grpc::Status> SessionService::begin(
+    const Caller& caller, const CreateOrRestore& request, v1::Session& response) {
   if (const auto error = refusal_of_id("session_id", request.session_id())) return *error;
-  if (!request.session().has_scene()) {
-    return errors::field_invalid("session.scene", "is absent");
-  }
-
   const auto named = named_request(caller, request, request.request_id());
   if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
   const Request& name = std::get<Request>(named);
@@ -132,6 +131,27 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
   if (const auto* error = std::get_if<grpc::Status>(&known)) return *error;
   if (const auto& creation = std::get<std::optional<CarriedOut>>(known))
     return created_before(caller, *creation, response);
+  return Begun{name, request.session_id().empty() ? make_session_id() : request.session_id()};
+}
+
+// Its log goes on after so many entries.
+std::shared_ptr<Session> SessionService::make_session(const std::string& id, const Caller& caller,
+                                                      Simulation simulation,
+                                                      std::int64_t entries) const {
+  const SessionIdentity identity =
+      make_identity(id, numerics_id(), caller.principal, backend_.limits.max_frame_work);
+  return std::make_shared<Session>(identity, std::move(simulation), backend_.host(),
+                                   backend_.store->log_of(identity.uid, entries));
+}
+
+grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessionRequest& request,
+                                    v1::Session& response) {
+  const auto begun = begin(caller, request, response);
+  if (const auto* status = std::get_if<grpc::Status>(&begun)) return *status;
+  const auto& [name, id] = std::get<Begun>(begun);
+  if (!request.session().has_scene()) {
+    return errors::field_invalid("session.scene", "is absent");
+  }
 
   // everything that is wrong with the scene, and its size, before anything is made of it
   auto converted = to_scene(request.session().scene(), "session.scene");
@@ -147,16 +167,12 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
                                  std::to_string(backend_.limits.max_particles_per_session),
                              false);
   }
-  const std::string id = request.session_id().empty() ? make_session_id() : request.session_id();
   if (auto status = refusal(caller, request, id); !status.ok()) return status;
 
   Simulation simulation(std::move(scene));
   simulation.limit_frame_work(backend_.limits.max_frame_work);
   if (const auto refusal = simulation.refusal()) return refused_step(simulation, *refusal);
-  const SessionIdentity identity =
-      make_identity(id, numerics_id(), caller.principal, backend_.limits.max_frame_work);
-  const auto session = std::make_shared<Session>(identity, std::move(simulation), backend_.host(),
-                                                 backend_.store->log_of(identity.uid, 0));
+  const auto session = make_session(id, caller, std::move(simulation), 0);
   response = to_proto(*session);
   if (request.validate_only()) {
     response.clear_name();
@@ -192,19 +208,14 @@ grpc::Status SessionService::keep(const std::shared_ptr<Session>& session, const
 
 grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSessionRequest& request,
                                      v1::Session& response) {
-  if (const auto error = refusal_of_id("session_id", request.session_id())) return *error;
   const auto parts = read_snapshot_name(request.name());
   if (!parts) {
     return errors::field_invalid(
         "name", "\"" + request.name() + "\" is not sessions/{session}/snapshots/{snapshot}");
   }
-  const auto named = named_request(caller, request, request.request_id());
-  if (const auto* error = std::get_if<grpc::Status>(&named)) return *error;
-  const Request& name = std::get<Request>(named);
-  const auto known = carried_out(name);
-  if (const auto* error = std::get_if<grpc::Status>(&known)) return *error;
-  if (const auto& creation = std::get<std::optional<CarriedOut>>(known))
-    return created_before(caller, *creation, response);
+  const auto begun = begin(caller, request, response);
+  if (const auto* status = std::get_if<grpc::Status>(&begun)) return *status;
+  const auto& [name, id] = std::get<Begun>(begun);
 
   const auto found = find_anywhere(backend_, caller, parts->session);
   if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
@@ -213,7 +224,6 @@ grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSess
   const bool there = std::any_of(snapshots.begin(), snapshots.end(),
                                  [&](const NamedSnapshot& each) { return each.id == parts->id; });
   if (!there) return errors::snapshot_not_found(request.name());
-  const std::string id = request.session_id().empty() ? make_session_id() : request.session_id();
   if (const auto reason = backend_.registry.refusal(id, caller.principal, source.particle_count()))
     return refused(*reason, caller, id);
 
@@ -238,11 +248,7 @@ grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSess
     return errors::too_many_substeps(refusal, source.particle_count(), "name");
   }
 
-  const SessionIdentity identity =
-      make_identity(id, numerics_id(), caller.principal, backend_.limits.max_frame_work);
-  const auto session =
-      std::make_shared<Session>(identity, Simulation(source.scene()), backend_.host(),
-                                backend_.store->log_of(identity.uid, saved.first));
+  const auto session = make_session(id, caller, Simulation(source.scene()), saved.first);
   const SessionSnapshot beginning = snapshot;
   if (!session->restore(std::move(saved)))
     return errors::snapshot_damaged(request.name(), "it does not fit the scene of its session");

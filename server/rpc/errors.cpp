@@ -206,6 +206,26 @@ grpc::Status aborted(const std::string& reason, const std::string& message,
   return to_grpc(make(grpc::StatusCode::ABORTED, reason, message, metadata));
 }
 
+grpc::Status uid_changed(const std::string& uid) {
+  return aborted("UID_CHANGED", "this name belongs to another session now", {{"uid", uid}});
+}
+
+grpc::Status session_running(const std::string& name, std::int64_t latest_frame) {
+  return failed_precondition("SESSION_RUNNING", name + " runs by itself; pause it before stepping",
+                             {{"latest_frame", std::to_string(latest_frame)}});
+}
+
+grpc::Status frame_stale(std::int64_t latest_frame) {
+  const std::string latest = std::to_string(latest_frame);
+  return aborted("FRAME_STALE", "expected_frame is not the newest frame, " + latest,
+                 {{"latest_frame", latest}});
+}
+
+grpc::Status not_ahead(std::int64_t latest_frame) {
+  return field_invalid("until_frame",
+                       "does not lie ahead of the newest frame, " + std::to_string(latest_frame));
+}
+
 grpc::Status cancelled() {
   return to_grpc(make(grpc::StatusCode::CANCELLED, "CANCELLED", "the caller cancelled"));
 }

@@ -20,8 +20,8 @@ using Metadata = std::map<std::string, std::string>;
 grpc::Status field_invalid(const std::vector<Problem>& problems);
 grpc::Status field_invalid(const std::string& field, const std::string& message);
 
-// `field` is to blame for the step.
-// A frame of so many particles would need more substeps than are computed.
+// A frame of so many particles would need more substeps than are computed. `field` is to blame for
+// the step, here and below.
 grpc::Status too_many_substeps(const StepRefusal& step, std::int64_t particles,
                                const std::string& field);
 grpc::Status step_unstable(const StepRefusal& step, const std::string& field);
@@ -46,6 +46,11 @@ grpc::Status failed_precondition(const std::string& reason, const std::string& m
 grpc::Status aborted(const std::string& reason, const std::string& message,
                      const Metadata& metadata);
 grpc::Status cancelled();
+// The name belongs to another session than the one with the uid that was asked for.
+grpc::Status uid_changed(const std::string& uid);
+grpc::Status session_running(const std::string& name, std::int64_t latest_frame);
+grpc::Status frame_stale(std::int64_t latest_frame);
+grpc::Status not_ahead(std::int64_t latest_frame);
 
 grpc::Status frame_expired(std::int64_t wanted, const Progress& progress);
 grpc::Status solver_failed(const std::string& failure, std::int64_t latest_frame);

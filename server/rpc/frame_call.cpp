@@ -64,8 +64,7 @@ grpc::Status FrameCall::take(const FoundSession& found, const std::string& uid,
   if (const auto* error = std::get_if<grpc::Status>(&found)) return *error;
   session_ = std::get<std::shared_ptr<Session>>(found);
   if (!uid.empty() && uid != session_->uid()) {
-    return errors::aborted("UID_CHANGED", "this name belongs to another session now",
-                           {{"uid", session_->uid()}});
+    return errors::uid_changed(session_->uid());
   }
   const auto particles = static_cast<std::int64_t>(session_->status().newest->positions.size()) / 3;
   for (auto& problem : find_problems(order_.format, particles)) {

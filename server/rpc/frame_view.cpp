@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/rpc/bytes.h"
+#include "server/rpc/checks.h"
 #include "server/rpc/errors.h"
 
 namespace weft {
@@ -32,20 +33,11 @@ void FrameView::OnReadDone(bool ok) {
 }
 
 void FrameView::take(const v1::ViewFramesRequest& request) {
-  std::vector<Problem> problems;
+  std::vector<Problem> problems = find_problems(request, credits_);
   const auto first_alone = [&](const char* field, bool given) {
     if (given) problems.push_back({field, "belongs to the first message alone"});
   };
-  if (request.credits() < 1 || request.credits() > kMostCredits) {
-    problems.push_back({"credits", std::to_string(request.credits()) + " is not within 1 to " +
-                                       std::to_string(kMostCredits)});
-  } else if (credits_ + request.credits() > kMostCredits) {
-    problems.push_back({"credits", std::to_string(credits_ + request.credits()) +
-                                       " would be open; at most " + std::to_string(kMostCredits) +
-                                       " are"});
-  } else {
-    credits_ += request.credits();
-  }
+  if (problems.empty()) credits_ += request.credits();
   if (!is_subscribed())
     return find(request.session(), request.uid(), request.format(), std::move(problems));
   first_alone("session", !request.session().empty());

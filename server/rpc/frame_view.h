@@ -11,8 +11,6 @@ namespace weft {
 class FrameView final : public grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>,
                         public FrameCall {
  public:
-  static constexpr int kMostCredits = 64;
-
   using FrameCall::FrameCall;
 
   // Called once, first.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/model/text.h"
+#include "server/rpc/checks.h"
 #include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/find.h"
@@ -113,16 +114,13 @@ grpc::Status to_status(const Refusal& refusal, const Session& session) {
     case Refusal::Why::kBusy:
       return errors::exhausted("commands", "too many calls wait for " + name, true);
     case Refusal::Why::kRunning:
-      return errors::failed_precondition(
-          "SESSION_RUNNING", name + " runs by itself; pause it before stepping", latest);
+      return errors::session_running(name, refusal.frame);
     case Refusal::Why::kFailed:
       return errors::solver_failed(session.status().failure, refusal.frame);
     case Refusal::Why::kStale:
-      return errors::aborted("FRAME_STALE", "expected_frame is not the newest frame, " + frame,
-                             latest);
+      return errors::frame_stale(refusal.frame);
     case Refusal::Why::kNotAhead:
-      return errors::field_invalid("until_frame",
-                                   "does not lie ahead of the newest frame, " + frame);
+      return errors::not_ahead(refusal.frame);
     case Refusal::Why::kInterrupted:
       return errors::aborted("STEP_INTERRUPTED", name + " was paused after frame " + frame, latest);
     case Refusal::Why::kCancelled:
@@ -379,13 +377,10 @@ grpc::ServerUnaryReactor* SessionService::StepSession(grpc::CallbackServerContex
                                                       const v1::StepSessionRequest* request,
                                                       v1::StepSessionResponse* response) {
   const auto step = [request, response](const Asked& asked, UnaryCall& call) {
-    constexpr std::int64_t kMostFrames = 100'000;
+    if (const auto problems = find_problems(*request); !problems.empty())
+      return call.Finish(errors::field_invalid(problems));
     StepCommand command;
-    if (request->has_frames()) command.frames = request->frames();
-    if (command.frames < 1 || command.frames > kMostFrames) {
-      return call.Finish(errors::field_invalid(
-          "frames", std::to_string(command.frames) + " is not within 1 to 100000"));
-    }
+    command.frames = frames_of(*request);
     if (request->has_expected_frame()) command.expected_frame = request->expected_frame();
 
     std::stop_source stop;
@@ -408,15 +403,10 @@ grpc::ServerUnaryReactor* SessionService::RunSession(grpc::CallbackServerContext
                                                      const v1::RunSessionRequest* request,
                                                      v1::RunSessionResponse* response) {
   const auto run = [request, response](const Asked& asked, UnaryCall& call) {
+    if (const auto problems = find_problems(*request); !problems.empty())
+      return call.Finish(errors::field_invalid(problems));
     RunCommand command;
-    if (request->has_time_scale()) {
-      const double scale = request->time_scale();
-      if (!(scale >= 1e-3 && scale <= 1000)) {  // NaN too
-        return call.Finish(
-            errors::field_invalid("time_scale", join(scale, " is not within 0.001 to 1000")));
-      }
-      command.time_scale = scale;
-    }
+    if (request->has_time_scale()) command.time_scale = request->time_scale();
     if (request->has_until_frame()) command.until_frame = request->until_frame();
     command.until_rest = request->until_rest();
     submit(call, *request, asked, std::move(command),

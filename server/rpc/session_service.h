@@ -87,6 +87,15 @@ class SessionService final : public SessionMethods {
   grpc::ServerUnaryReactor* create_later(std::int64_t particles, v1::Session* response, Make make);
   grpc::Status refusal(const Caller& caller, const v1::CreateSessionRequest& request,
                        const std::string& id) const;
+  struct Begun {
+    Request name;
+    std::string id;
+  };
+  template <class CreateOrRestore>
+  std::variant<Begun, grpc::Status> begin(const Caller& caller, const CreateOrRestore& request,
+                                          v1::Session& response);
+  std::shared_ptr<Session> make_session(const std::string& id, const Caller& caller,
+                                        Simulation simulation, std::int64_t entries) const;
   grpc::Status create(const Caller& caller, const v1::CreateSessionRequest& request,
                       v1::Session& response);
   grpc::Status restore(const Caller& caller, const v1::RestoreSessionRequest& request,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <thread>
 #include <utility>
 
 #include "server/session/idle_threads.h"
@@ -16,9 +17,14 @@ Timeline::Timeline(Simulation given, std::int64_t max_frame_work, Duration snaps
 FramePart Timeline::advance(Scheduler& scheduler) {
   constexpr std::chrono::microseconds kSlice{20'000}, kBusySlice{200};
   const auto begin = Clock::now();
+  auto yielded = begin;
   const Enough enough = [&] {
-    const auto time = Clock::now() - begin;
-    return time >= kSlice || (time >= kBusySlice && scheduler.busy());
+    const auto now = Clock::now();
+    if (now - yielded >= kBusySlice) {  // to the threads of calls and streams, where they wait
+      std::this_thread::yield();
+      yielded = now;
+    }
+    return now - begin >= kSlice || (now - begin >= kBusySlice && scheduler.busy());
   };
   const int most_threads = simulation.most_threads();
   FramePart part{};

@@ -6,6 +6,7 @@
 #include "client/load/load.h"
 #include "client/output/text.h"
 #include "client/templates/templates.h"
+#include "client/textile_file.h"
 #include "tests/stress/stress.h"
 #include "tests/stress/weftd.h"
 
@@ -56,8 +57,8 @@ Outcome real_time(Form form) {
       .bounds = held.sessions >= kHold};
   if (form == Form::kShort) return outcome;
   for (const char* textile : {"wool_tropical", "cotton_poplin"})
-    outcome.figure +=
-        fmt::format("; {}: {}", textile, find_held(form, {.textile = textile}).sessions);
+    outcome.figure += fmt::format(
+        "; {}: {}", textile, find_held(form, {.textile = client::textile_named(textile)}).sessions);
   return outcome;
 }
 

@@ -63,17 +63,18 @@ HWY_INLINE Distances distances(const Box& box, const Eigen::Matrix3d& turn, cons
   const Places edge[] = {everywhere(turn.col(0)), everywhere(turn.col(1)), everywhere(turn.col(2))};
   const Places local{dot(away, edge[0]), dot(away, edge[1]), dot(away, edge[2])};
   const Places half = everywhere(box.half_size);
-  const Places beyond{hn::Sub(hn::Abs(local.x), half.x), hn::Sub(hn::Abs(local.y), half.y),
-                      hn::Sub(hn::Abs(local.z), half.z)};
-  const Places outside{hn::Max(beyond.x, zero), hn::Max(beyond.y, zero), hn::Max(beyond.z, zero)};
+  const Places to_faces{hn::Sub(hn::Abs(local.x), half.x), hn::Sub(hn::Abs(local.y), half.y),
+                        hn::Sub(hn::Abs(local.z), half.z)};
+  const Places outside{hn::Max(to_faces.x, zero), hn::Max(to_faces.y, zero),
+                       hn::Max(to_faces.z, zero)};
   const Reals length = hn::Sqrt(squared(outside));
   const auto apart = hn::Gt(length, zero);
 
   // inside: out by the nearest face
-  const Reals inside = hn::Max(beyond.x, hn::Max(beyond.y, beyond.z));
-  const auto by_x = hn::Eq(beyond.x, inside);
-  const auto by_y = hn::AndNot(by_x, hn::Eq(beyond.y, inside));
-  const auto by_z = hn::AndNot(hn::Or(by_x, by_y), hn::Eq(beyond.z, inside));
+  const Reals inside = hn::Max(to_faces.x, hn::Max(to_faces.y, to_faces.z));
+  const auto by_x = hn::Eq(to_faces.x, inside);
+  const auto by_y = hn::AndNot(by_x, hn::Eq(to_faces.y, inside));
+  const auto by_z = hn::AndNot(hn::Or(by_x, by_y), hn::Eq(to_faces.z, inside));
   const Reals one = real(1);
   const Reals inverse = hn::Div(one, length);
   const auto part = [&](Reals out, auto face, Reals side) HWY_ATTR {
@@ -164,10 +165,11 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
   Reals nearest = far;
   for (int j = 0; j < state.vectors(); ++j) {
     for (int part = 0; part < kLanes; part += step) {
-      T* const seen = state.seen(row) + j * State::kSeenStride + part;
-      T* const own = state.own(row) + j * state.own_stride() + part;
+      T* const shared = state.shared(row) + j * State::kSharedStride + part;
+      T* const local = state.local(row) + j * state.local_stride() + part;
       const auto at = [&](int plane) HWY_ATTR {
-        return plane < State::kSeen ? seen + plane * kLanes : own + (plane - State::kSeen) * kLanes;
+        return plane < State::kShared ? shared + plane * kLanes
+                                      : local + (plane - State::kShared) * kLanes;
       };
       const auto exact = [&](int plane, int error) HWY_ATTR {
         Places v{Of::load(at(plane)), Of::load(at(plane + 1)), Of::load(at(plane + 2))};

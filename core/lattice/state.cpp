@@ -39,22 +39,23 @@ template <class T>
 SweepState<T>::SweepState(const LatticeLayout<T>& layout, bool compensated)
     : layout_(layout),
       planes_(compensated ? kDError + 3 : kXError),
-      seen_(seen_size(halo_)),
-      own_(static_cast<std::size_t>(layout.rows * own_row())) {
+      shared_(shared_size(halo_)),
+      local_(static_cast<std::size_t>(layout.rows * local_row())) {
   for (int c = 0; c < layout.vectors() * LatticeLayout<T>::kLanes; ++c) {
     const std::ptrdiff_t vector = layout.vector(c), lane = layout.lane(c);
-    columns_.push_back({vector * kSeenStride + lane, vector * own_stride() - kSeenStride + lane});
+    columns_.push_back(
+        {vector * kSharedStride + lane, vector * local_stride() - kSharedStride + lane});
   }
 }
 
 template <class T>
 void SweepState<T>::set_halo(int halo) {
   if (halo == halo_) return;
-  AlignedArray<T> old(seen_size(halo));
-  std::swap(old, seen_);
+  AlignedArray<T> old(shared_size(halo));
+  std::swap(old, shared_);
   const int old_halo = std::exchange(halo_, halo);
   for (int r = 0; r < layout_.rows; ++r)
-    std::copy_n(old.data() + seen_at(r, old_halo), layout_.vectors() * kSeenStride, seen(r));
+    std::copy_n(old.data() + shared_at(r, old_halo), layout_.vectors() * kSharedStride, shared(r));
 }
 
 template <class T>
@@ -76,7 +77,7 @@ std::vector<SweepBand<T>>& SweepState<T>::divide(int bands) {
       to = AlignedArray<T>(static_cast<std::size_t>(2 * (row_size(halo_) + margin(halo_))));
     for (int k = 0; k < 2; ++k) {
       if (row + k < 0 || row + k >= rows) continue;
-      std::copy_n(seen(row + k), layout_.vectors() * kSeenStride,
+      std::copy_n(shared(row + k), layout_.vectors() * kSharedStride,
                   to.data() + margin(halo_) + k * row_size(halo_));
     }
   };

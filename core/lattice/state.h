@@ -49,8 +49,8 @@ struct LatticeLayout {
   }
 };
 
-// Rows first ... last - 1, which are swept on their own: with copies of what was seen, before the
-// sweep, of the two rows before and the two after them.
+// Rows first ... last - 1, which are swept apart from others: with copies of the shared planes,
+// from before the sweep, of the two rows before and the two after them.
 template <class T>
 struct SweepBand {
   int first = 0, last = 0;
@@ -58,16 +58,16 @@ struct SweepBand {
   T farthest = 0;  // largest displacement, m
 };
 
-// A lattice sheet in motion. Of every vector, its planes one after the other: those that neighbours
-// see, with a halo, and those of its own.
+// A lattice sheet in motion. Of every vector, its planes one after the other: shared ones, which
+// neighbours read, with a halo, and local ones.
 template <class T>
 class SweepState {
  public:
   enum Plane {
     kX = 0,  // position, m
     kW = 3,  // 3 d - d_previous: velocity x 2 dt, m
-    kSeen = 6,
-    kD = kSeen,    // displacement of the last step, m
+    kShared = 6,
+    kD = kShared,  // displacement of the last step, m
     kStep2 = 9,    // dt^2 / mass, s^2/kg; 0 holds a particle
     kXError = 10,  // what rounding has added to x, m; with compensation only, as the next one
     kDError = 13,  // what rounding has added to d, m
@@ -77,20 +77,20 @@ class SweepState {
 
   int planes() const { return planes_; }
   int vectors() const { return layout_.vectors(); }
-  std::size_t bytes() const { return (seen_.size() + own_.size()) * sizeof(T); }
+  std::size_t bytes() const { return (shared_.size() + local_.size()) * sizeof(T); }
   // Values from one vector of a row to the next.
-  static constexpr std::ptrdiff_t kSeenStride = kSeen * LatticeLayout<T>::kLanes;
-  std::ptrdiff_t own_stride() const { return (planes_ - kSeen) * LatticeLayout<T>::kLanes; }
+  static constexpr std::ptrdiff_t kSharedStride = kShared * LatticeLayout<T>::kLanes;
+  std::ptrdiff_t local_stride() const { return (planes_ - kShared) * LatticeLayout<T>::kLanes; }
   // Vector 0 of a row.
-  T* seen(int r) { return seen_.data() + seen_at(r, halo_); }
-  T* own(int r) { return own_.data() + r * own_row(); }
+  T* shared(int r) { return shared_.data() + shared_at(r, halo_); }
+  T* local(int r) { return local_.data() + r * local_row(); }
 
   // A particle's values, by plane.
   template <class Value>
   struct PlaceOf {
-    Value *seen, *own;
+    Value *shared, *local;
     Value& operator[](int plane) const {
-      return (plane < kSeen ? seen : own)[plane * LatticeLayout<T>::kLanes];
+      return (plane < kShared ? shared : local)[plane * LatticeLayout<T>::kLanes];
     }
   };
   using Place = PlaceOf<T>;
@@ -98,42 +98,42 @@ class SweepState {
   // Column c of row r; also columns beyond the last, as far as vectors reach.
   Place place(int r, int c) {
     const Column& column = columns_[static_cast<std::size_t>(c)];
-    return {seen(r) + column.seen, own(r) + column.own};
+    return {shared(r) + column.shared, local(r) + column.local};
   }
   ConstPlace place(int r, int c) const {
     const Place place = const_cast<SweepState*>(this)->place(r, c);
-    return {place.seen, place.own};
+    return {place.shared, place.local};
   }
 
   // Lets go of what only sweeps need, until the next is prepared.
   void release_memory();
   // Divides the sheet as it is now into so many bands, which may be swept at the same time.
   std::vector<SweepBand<T>>& divide(int bands);
-  // What a band sees of row r, first - 2 <= r < last + 2.
-  T* seen(SweepBand<T>& band, int r) {
-    if (r < band.first) return band.before.data() + seen_at(r - band.first + 2, halo_);
-    if (r >= band.last) return band.after.data() + seen_at(r - band.last, halo_);
-    return seen(r);
+  // The shared planes of row r for a band, first - 2 <= r < last + 2.
+  T* shared(SweepBand<T>& band, int r) {
+    if (r < band.first) return band.before.data() + shared_at(r - band.first + 2, halo_);
+    if (r >= band.last) return band.after.data() + shared_at(r - band.last, halo_);
+    return shared(r);
   }
 
  private:
-  static std::ptrdiff_t margin(int halo) { return (halo + 1) * kSeenStride; }
-  std::ptrdiff_t row_size(int halo) const { return (vectors() + 2 * halo) * kSeenStride; }
-  std::ptrdiff_t seen_at(int r, int halo) const { return margin(halo) + r * row_size(halo); }
-  std::size_t seen_size(int halo) const {
-    return static_cast<std::size_t>(seen_at(layout_.rows, halo) + margin(halo));
+  static std::ptrdiff_t margin(int halo) { return (halo + 1) * kSharedStride; }
+  std::ptrdiff_t row_size(int halo) const { return (vectors() + 2 * halo) * kSharedStride; }
+  std::ptrdiff_t shared_at(int r, int halo) const { return margin(halo) + r * row_size(halo); }
+  std::size_t shared_size(int halo) const {
+    return static_cast<std::size_t>(shared_at(layout_.rows, halo) + margin(halo));
   }
   void set_halo(int halo);
-  std::ptrdiff_t own_row() const { return layout_.vectors() * own_stride(); }
+  std::ptrdiff_t local_row() const { return layout_.vectors() * local_stride(); }
 
   struct Column {
-    std::ptrdiff_t seen, own;  // where it is in the row, for plane 0
+    std::ptrdiff_t shared, local;  // where it is in the row, for plane 0
   };
   LatticeLayout<T> layout_;
   int planes_;
   int halo_ = LatticeLayout<T>::kHalo;  // 0: packed
   std::vector<Column> columns_;
-  AlignedArray<T> seen_, own_;
+  AlignedArray<T> shared_, local_;
   std::vector<SweepBand<T>> bands_;
 };
 

@@ -15,7 +15,7 @@ HWY_BEFORE_NAMESPACE();
 namespace weft::HWY_NAMESPACE {
 
 // The connections that are evaluated when row r is swept: those that lead down from r, and those
-// along row r + 1, so that row r has then heard of all its own.
+// along row r + 1, so that the forces on row r are then complete.
 struct Connection {
   int from, to, right;  // rows from r on, columns to the right
   ColumnPlane exists;   // kShare: with that share
@@ -44,9 +44,9 @@ class Sweep {
         band_(band),
         vectors_(law.layout.vectors()),
         fetches_(state.bytes() > (std::size_t{8} << 20)),
-        planes_(law.damping > 0 || law.wind.blows ? State::kSeen : State::kW),
+        planes_(law.damping > 0 || law.wind.blows ? State::kShared : State::kW),
         forces_(work + (kHalo + 1) * kForces),
-        heard_(work + forces_size(law.layout)),
+        velocity_sums_(work + forces_size(law.layout)),
         largest_(hn::Zero(D())) {
     for (std::size_t k = 0; k < halo_.size(); ++k) {
       const int at = law.layout.halo(static_cast<int>(k));
@@ -56,16 +56,16 @@ class Sweep {
   }
 
   static std::size_t work_size(const Layout& layout) {
-    return static_cast<std::size_t>(forces_size(layout) + layout.vectors() * kHeard);
+    return static_cast<std::size_t>(forces_size(layout) + layout.vectors() * kVelocitySums);
   }
 
   T run() {
     std::fill_n(forces_ - kHalo * kForces, 3 * (vectors_ + 2 * kHalo) * kForces, T(0));
-    std::fill_n(heard_, vectors_ * kHeard, T(0));
+    std::fill_n(velocity_sums_, vectors_ * kVelocitySums, T(0));
     const int first = std::max(band_.first - 2, -1);
     for (int r = std::max(first, 0); r < first + 2; ++r) {
       prepare(r);
-      if (law_.damping > 0) listen(r);
+      if (law_.damping > 0) start_damping(r);
     }
     for (int r = first; r < band_.last; ++r) {
       prepare(r + 2);
@@ -83,10 +83,10 @@ class Sweep {
   // Whether connection 6 begins the sum of forces on its end, so that none has to be set to 0.
   static constexpr bool kStartsRows = kInterlaced && kBendsDiagonal;
 
-  // From one vector to the next, of forces on the rows r, r + 1, r + 2, with a halo; of what row
-  // r + 3 has heard, and row r + 4, for its damping; of what is seen.
-  static constexpr std::ptrdiff_t kForces = 3 * kLanes, kHeard = 6 * kLanes;
-  static constexpr std::ptrdiff_t kSeen = State::kSeenStride;
+  // From one vector to the next, of forces on the rows r, r + 1, r + 2, with a halo; of what rows
+  // r + 3 and row r + 4 sum up of their neighbours' velocities; of shared planes.
+  static constexpr std::ptrdiff_t kForces = 3 * kLanes, kVelocitySums = 6 * kLanes;
+  static constexpr std::ptrdiff_t kShared = State::kSharedStride;
   static std::ptrdiff_t forces_size(const Layout& layout) {
     return (3 * (layout.vectors() + 2 * kHalo) + 2) * kForces;
   }
@@ -100,18 +100,18 @@ class Sweep {
     T near_rows, far_rows;  // how many of r + 1, r + 2, r + 3 and of r, r + 2, r + 4 exist
   };
 
-  // One vector: what is seen of rows r, r + 1, r + 2, the forces on them, what is its own.
+  // One vector: the shared planes of rows r, r + 1, r + 2, the forces on them, its local planes.
   struct Place {
-    T *seen, *seen1, *seen2;
+    T *shared, *shared1, *shared2;
     T *force, *force1, *force2;
-    T *heard, *own;
+    T *sums, *local;
     const T* columns;
   };
 
   // On one vector of each of the rows r, r + 1, r + 2.
   struct Forces {
-    Triple<V> own, next, after;
-    Triple<V> beside{};  // right of next, until all that goes there is added
+    Triple<V> row0, row1, row2;
+    Triple<V> right1{};  // right of row1, until all that goes there is added
   };
 
   // A vector of the halo, that which it continues, and by how many lanes it is shifted against
@@ -144,11 +144,11 @@ class Sweep {
     return hn::Load(D(), p.columns + plane * kLanes);
   }
 
-  // Completes what is seen of row r by its halo.
+  // Completes the shared planes of row r by their halo.
   void prepare(int r) const {
     const D d;
     if (r >= law_.layout.rows) return;
-    T* const row = state_.seen(band_, r);
+    T* const row = state_.shared(band_, r);
     const auto copy = [&](const T* from, T* to, const T* mask) HWY_ATTR {
       for (int part = 0; part < kLanes; part += kPart) {
         const V exists = hn::Load(d, mask + part);
@@ -159,10 +159,10 @@ class Sweep {
       }
     };
     for (const int j : law_.padded)
-      copy(row + j * kSeen, row + j * kSeen,
+      copy(row + j * kShared, row + j * kShared,
            law_.columns.data() + (j * kColumnPlanes + kHere) * kLanes);
     for (std::size_t k = 0; k < halo_.size(); ++k)
-      copy(row + halo_[k].vector * kSeen + halo_[k].shift, row + halo_[k].at * kSeen,
+      copy(row + halo_[k].vector * kShared + halo_[k].shift, row + halo_[k].at * kShared,
            law_.halo_exists.data() + k * kLanes);
   }
 
@@ -206,59 +206,60 @@ class Sweep {
   void sweep_row(int r) {
     const int last = law_.layout.rows - 1;
     const Row row = describe(r);
-    T* seen = state_.seen(band_, std::max(r, 0));
-    T* seen1 = state_.seen(band_, std::min(r + 1, last));
-    T* seen2 = state_.seen(band_, std::min(r + 2, last));
-    T *force = forces(r), *force1 = forces(r + 1), *force2 = forces(r + 2), *heard = heard_;
-    T* own = state_.own(std::max(r, band_.first));
+    T* shared = state_.shared(band_, std::max(r, 0));
+    T* shared1 = state_.shared(band_, std::min(r + 1, last));
+    T* shared2 = state_.shared(band_, std::min(r + 2, last));
+    T *force = forces(r), *force1 = forces(r + 1), *force2 = forces(r + 2), *sums = velocity_sums_;
+    T* local = state_.local(std::max(r, band_.first));
     const T* columns = law_.columns.data();
     if constexpr (kStartsRows) std::fill_n(force2, 2 * kForces, T(0));  // nothing is left of these
     for (int j = 0; j < vectors_; ++j) {
 #pragma GCC unroll 1
       for (int part = 0; part < kLanes; part += kPart) {
-        const Place p{seen + part,   seen1 + part, seen2 + part, force + part,  force1 + part,
-                      force2 + part, heard + part, own + part,   columns + part};
-        if (fetches_ && part == 0) fetch(seen2, own);
+        const Place p{shared + part, shared1 + part, shared2 + part, force + part,  force1 + part,
+                      force2 + part, sums + part,    local + part,   columns + part};
+        if (fetches_ && part == 0) fetch(shared2, local);
         if (law_.border[static_cast<std::size_t>(j)])
           sweep_vector<true>(row, p);
         else
           sweep_vector<false>(row, p);
       }
-      seen += kSeen, seen1 += kSeen, seen2 += kSeen;
-      force += kForces, force1 += kForces, force2 += kForces, heard += kHeard;
-      own += state_.own_stride(), columns += kColumnPlanes * kLanes;
+      shared += kShared, shared1 += kShared, shared2 += kShared;
+      force += kForces, force1 += kForces, force2 += kForces, sums += kVelocitySums;
+      local += state_.local_stride(), columns += kColumnPlanes * kLanes;
     }
   }
 
   // Of sheets that fit no cache, what the sweep comes to next.
-  HWY_INLINE void fetch(const T* seen, const T* own) const {
+  HWY_INLINE void fetch(const T* shared, const T* local) const {
     constexpr int kAhead = 16;  // vectors
-    const std::ptrdiff_t own_stride = state_.own_stride();
-    for (std::ptrdiff_t at = 0; at < kSeen; at += kLanes)
-      __builtin_prefetch(seen + kAhead * kSeen + at, 1, 2);
-    for (std::ptrdiff_t at = 0; at < own_stride; at += kLanes)
-      __builtin_prefetch(own + kAhead * own_stride + at, 1, 2);
+    const std::ptrdiff_t local_stride = state_.local_stride();
+    for (std::ptrdiff_t at = 0; at < kShared; at += kLanes)
+      __builtin_prefetch(shared + kAhead * kShared + at, 1, 2);
+    for (std::ptrdiff_t at = 0; at < local_stride; at += kLanes)
+      __builtin_prefetch(local + kAhead * local_stride + at, 1, 2);
   }
 
-  // Lets row r be heard, as row r + 2 is while row r is swept.
-  void listen(int r) {
+  // Damps row r by the rows above and adds it to its neighbours' sums, as is done with row r + 2
+  // while row r is swept.
+  void start_damping(int r) {
     const Row row = describe(r - 2);
     for (int j = 0; j < vectors_; ++j)
       for (int part = 0; part < kLanes; part += kPart) {
-        T* const seen = state_.seen(band_, r) + j * kSeen + part;
+        T* const shared = state_.shared(band_, r) + j * kShared + part;
         T* const force = forces(r) + j * kForces + part;
-        const Place p{seen,
-                      seen,
-                      seen,
+        const Place p{shared,
+                      shared,
+                      shared,
                       force,
                       force,
                       force,
-                      heard_ + j * kHeard + part,
+                      velocity_sums_ + j * kVelocitySums + part,
                       nullptr,
                       law_.columns.data() + j * kColumnPlanes * kLanes + part};
         Forces f{zero(), zero(), load(force)};
         damp<true>(row, p, f);
-        store(f.after, force);
+        store(f.row2, force);
       }
   }
 
@@ -271,16 +272,16 @@ class Sweep {
     add_pulls(p, pulls, f, springs(), bends());
     if constexpr (kIsometric) add_isometric<kBorder>(row, p, f);
     if (law_.wind.blows && row.after) add_wind<kBorder>(p, f);
-    store(f.next, p.force1);
-    store(f.after, p.force2);
-    if (row.moves) move(p, f.own);
+    store(f.row1, p.force1);
+    store(f.row2, p.force2);
+    if (row.moves) move(p, f.row0);
   }
 
   template <std::size_t k>
-  static HWY_INLINE Triple<V> ends(const T* seen, const T* seen1, const T* seen2) {
+  static HWY_INLINE Triple<V> ends(const T* shared, const T* shared1, const T* shared2) {
     constexpr Connection c = kConnections[k];
-    const Triple<V> from = load(c.from == 0 ? seen : seen1);
-    return minus(from, load((c.to == 1 ? seen1 : seen2) + c.right * kSeen));
+    const Triple<V> from = load(c.from == 0 ? shared : shared1);
+    return minus(from, load((c.to == 1 ? shared1 : shared2) + c.right * kShared));
   }
 
   // A force over its length, N/m, where the connection exists.
@@ -309,17 +310,17 @@ class Sweep {
   template <std::size_t k>
   static HWY_INLINE void add(const Place& p, const Triple<V>& apart, V pull, Forces& f) {
     constexpr Connection c = kConnections[k];
-    Triple<V>& from = c.from == 0 ? f.own : f.next;
+    Triple<V>& from = c.from == 0 ? f.row0 : f.row1;
     from = minus_times(from, apart, pull);
     if constexpr (c.right == 0) {
-      Triple<V>& end = c.to == 1 ? f.next : f.after;
+      Triple<V>& end = c.to == 1 ? f.row1 : f.row2;
       end = plus_times(end, apart, pull);
     } else {
       T* const end = (c.to == 1 ? p.force1 : p.force2) + c.right * kForces;
       if constexpr (k == 0 && kShears)  // connection 2 has the same end
-        f.beside = plus_times(load(end), apart, pull);
+        f.right1 = plus_times(load(end), apart, pull);
       else if constexpr (k == 2)
-        store(plus_times(f.beside, apart, pull), end);
+        store(plus_times(f.right1, apart, pull), end);
       else if constexpr (k == 6 && kStartsRows)
         store(times(apart, pull), end);
       else
@@ -348,8 +349,9 @@ class Sweep {
   HWY_INLINE Pulls pull(const Row& row, const Place& p, Connections<s...>,
                         Connections<b...>) const {
     const D d;
-    const Each<V, sizeof...(s)> l2{squared(ends<s>(p.seen, p.seen1, p.seen2))...};
-    [[maybe_unused]] const Each<V, sizeof...(b)> l{length(ends<b>(p.seen, p.seen1, p.seen2))...};
+    const Each<V, sizeof...(s)> l2{squared(ends<s>(p.shared, p.shared1, p.shared2))...};
+    [[maybe_unused]] const Each<V, sizeof...(b)> l{
+        length(ends<b>(p.shared, p.shared1, p.shared2))...};
     const Each<V, sizeof...(s)> y = inverse_sqrt(d, l2);
     [[maybe_unused]] std::size_t i = 0, j = 0;
     Pulls pulls{};
@@ -362,12 +364,12 @@ class Sweep {
   template <std::size_t... s, std::size_t... b>
   static HWY_INLINE void add_pulls(const Place& p, const Pulls& pulls, Forces& f, Connections<s...>,
                                    Connections<b...>) {
-    const T *seen = p.seen, *seen1 = p.seen1, *seen2 = p.seen2;
-    forget(seen);
-    forget(seen1);
-    forget(seen2);
-    (add<s>(p, ends<s>(seen, seen1, seen2), pulls[s], f), ...);
-    (add<b>(p, ends<b>(seen, seen1, seen2), pulls[b], f), ...);
+    const T *shared = p.shared, *shared1 = p.shared1, *shared2 = p.shared2;
+    forget(shared);
+    forget(shared1);
+    forget(shared2);
+    (add<s>(p, ends<s>(shared, shared1, shared2), pulls[s], f), ...);
+    (add<b>(p, ends<b>(shared, shared1, shared2), pulls[b], f), ...);
   }
 
   // Stencils 1, -2, 1 along row r + 1 and down the column, and 1, -1, -1, 1 over the cell between
@@ -379,20 +381,22 @@ class Sweep {
     const auto only = [&](ColumnPlane plane, T k) HWY_ATTR {
       return kBorder ? hn::And(hn::Set(d, k), column(p, plane)) : hn::Set(d, k);
     };
-    const Triple<V> here = load(p.seen), below = load(p.seen1), right1 = load(p.seen1 + kSeen);
-    const Triple<V> right2 = load(p.seen1 + 2 * kSeen), below2 = load(p.seen2);
+    const Triple<V> here = load(p.shared), below = load(p.shared1),
+                    right1 = load(p.shared1 + kShared);
+    const Triple<V> right2 = load(p.shared1 + 2 * kShared), below2 = load(p.shared2);
 
     const Triple<V> along =
         times(minus_times(plus(below, right2), right1, two), only(kRight2, row.isometric_along));
     V k_down = hn::Set(d, row.isometric_down);
     if constexpr (kBorder) k_down = hn::Mul(k_down, column(p, kShare));
     const Triple<V> down = times(minus_times(plus(here, below2), below, two), k_down);
-    const Triple<V> twist = times(minus(plus(below, load(p.seen2 + kSeen)), plus(right1, below2)),
-                                  only(kRight1, row.isometric_twist));
+    const Triple<V> twist =
+        times(minus(plus(below, load(p.shared2 + kShared)), plus(right1, below2)),
+              only(kRight1, row.isometric_twist));
 
-    f.own = minus(f.own, down);
-    f.next = minus(plus_times(minus(f.next, along), down, two), twist);
-    f.after = plus(minus(f.after, down), twist);
+    f.row0 = minus(f.row0, down);
+    f.row1 = minus(plus_times(minus(f.row1, along), down, two), twist);
+    f.row2 = plus(minus(f.row2, down), twist);
     T *const next1 = p.force1 + kForces, *const next2 = next1 + kForces;
     T* const after1 = p.force2 + kForces;
     store(plus(plus_times(load(next1), along, two), twist), next1);
@@ -405,23 +409,24 @@ class Sweep {
   HWY_INLINE void add_wind(const Place& p, Forces& f) const {
     const D d;
     constexpr std::ptrdiff_t kW = State::kW * kLanes;
-    const T *const seen1 = p.seen1, *const seen2 = p.seen2;
-    const Triple<V> here = load(seen1), right = load(seen1 + kSeen), below = load(seen2);
-    const Triple<V> beyond = load(seen2 + kSeen);
-    const Triple<V> slow = plus(load(seen1 + kSeen + kW), load(seen2 + kW));  // of both
+    const T *const shared1 = p.shared1, *const shared2 = p.shared2;
+    const Triple<V> here = load(shared1), right = load(shared1 + kShared), below = load(shared2);
+    const Triple<V> opposite = load(shared2 + kShared);
+    const Triple<V> slow = plus(load(shared1 + kShared + kW), load(shared2 + kW));  // of both
     const Each<Triple<V>, 2> cross{product(minus(below, here), minus(right, here)),
-                                   product(minus(right, beyond), minus(below, beyond))};
+                                   product(minus(right, opposite), minus(below, opposite))};
     const Each<V, 2> area2{squared(cross[0]), squared(cross[1])};
     const Each<V, 2> inverse = inverse_sqrt(d, area2);
-    Triple<V> upper = blow(cross[0], area2[0], inverse[0], plus(slow, load(seen1 + kW)));
-    Triple<V> lower = blow(cross[1], area2[1], inverse[1], plus(slow, load(seen2 + kSeen + kW)));
+    Triple<V> upper = blow(cross[0], area2[0], inverse[0], plus(slow, load(shared1 + kW)));
+    Triple<V> lower =
+        blow(cross[1], area2[1], inverse[1], plus(slow, load(shared2 + kShared + kW)));
     if constexpr (kBorder) {
       upper = only(upper, column(p, kRight1));
       lower = only(lower, column(p, kRight1));
     }
     const Triple<V> both = plus(upper, lower);
-    f.next = plus(f.next, upper);
-    f.after = plus(f.after, both);
+    f.row1 = plus(f.row1, upper);
+    f.row2 = plus(f.row2, both);
     T *const next1 = p.force1 + kForces, *const after1 = p.force2 + kForces;
     store(plus(load(next1), both), next1);
     store(plus(load(after1), lower), after1);
@@ -446,8 +451,8 @@ class Sweep {
     return {hn::And(v.x, mask), hn::And(v.y, mask), hn::And(v.z, mask)};
   }
 
-  // Damping (eq. 7), as the sum of w over all neighbours less as many times its own. Row r + 2 has
-  // heard from the rows above, and is heard by those around it.
+  // Damping (eq. 7), as the sum of w over all neighbours less as many times its own. Row r + 2
+  // has the sums of the rows above, and is added to those of the rows around it.
   template <bool kBorder>
   HWY_INLINE void damp(const Row& row, const Place& p, Forces& f) const {
     const D d;
@@ -460,39 +465,39 @@ class Sweep {
                   : hn::Add(hn::Add(columns, hn::Set(d, row.far_rows - 1)), count);
     }
     // one after the other: together they would take more registers than there are
-    damp_axis<0>(p, count, f.own.x, f.next.x, f.after.x);
-    damp_axis<1>(p, count, f.own.y, f.next.y, f.after.y);
-    damp_axis<2>(p, count, f.own.z, f.next.z, f.after.z);
+    damp_axis<0>(p, count, f.row0.x, f.row1.x, f.row2.x);
+    damp_axis<1>(p, count, f.row0.y, f.row1.y, f.row2.y);
+    damp_axis<2>(p, count, f.row0.z, f.row1.z, f.row2.z);
   }
   template <int kAxis>
-  HWY_INLINE void damp_axis(const Place& p, V count, V& own, V& next, V& after) const {
+  HWY_INLINE void damp_axis(const Place& p, V count, V& row0, V& row1, V& row2) const {
     const D d;
     const V damping = hn::Set(d, law_.damping);
     const auto w = [&](int right) HWY_ATTR {
-      return hn::Load(d, p.seen2 + right * kSeen + (State::kW + kAxis) * kLanes);
+      return hn::Load(d, p.shared2 + right * kShared + (State::kW + kAxis) * kLanes);
     };
-    T* const heard = p.heard + kAxis * kLanes;
+    T* const sums = p.sums + kAxis * kLanes;
     const V here = w(0);
     const V near = hn::Add(hn::Add(w(-1), here), w(1));
-    V sum = hn::Add(near, hn::Load(d, heard));
+    V sum = hn::Add(near, hn::Load(d, sums));
     if (law_.damp_far) {
       const V beside = hn::Add(hn::Add(w(-2), here), w(2));
       const V far = law_.damp_far_diagonal ? beside : here;
       sum = hn::Add(sum, beside);
-      hn::Store(hn::Add(near, hn::Load(d, heard + 3 * kLanes)), d, heard);
-      hn::Store(far, d, heard + 3 * kLanes);
-      own = hn::MulAdd(far, damping, own);
+      hn::Store(hn::Add(near, hn::Load(d, sums + 3 * kLanes)), d, sums);
+      hn::Store(far, d, sums + 3 * kLanes);
+      row0 = hn::MulAdd(far, damping, row0);
     } else {
-      hn::Store(near, d, heard);
+      hn::Store(near, d, sums);
     }
-    next = hn::MulAdd(near, damping, next);
-    after = hn::MulAdd(hn::NegMulAdd(here, count, sum), damping, after);
+    row1 = hn::MulAdd(near, damping, row1);
+    row2 = hn::MulAdd(hn::NegMulAdd(here, count, sum), damping, row2);
   }
 
   // Eq. 7 and 8: drag centred, Verlet in summed form.
   HWY_INLINE void move(const Place& p, const Triple<V>& force) {
     const D d;
-    const V step2 = hn::Load(d, p.own + (State::kStep2 - State::kSeen) * kLanes);
+    const V step2 = hn::Load(d, p.local + (State::kStep2 - State::kShared) * kLanes);
     const Triple<V> next{move_axis<0>(p, force.x, step2), move_axis<1>(p, force.y, step2),
                          move_axis<2>(p, force.z, step2)};
     if (law_.measured) largest_ = hn::Max(largest_, hn::And(squared(next), column(p, kHere)));
@@ -501,10 +506,10 @@ class Sweep {
   template <int kAxis>
   HWY_INLINE V move_axis(const Place& p, V force, V step2) const {
     const D d;
-    const auto seen = [&](int plane) HWY_ATTR { return p.seen + (plane + kAxis) * kLanes; };
-    const auto own = [&](int plane)
-                         HWY_ATTR { return p.own + (plane - State::kSeen + kAxis) * kLanes; };
-    const V old = hn::Load(d, own(State::kD)), at = hn::Load(d, seen(State::kX));
+    const auto shared = [&](int plane) HWY_ATTR { return p.shared + (plane + kAxis) * kLanes; };
+    const auto local = [&](int plane)
+                           HWY_ATTR { return p.local + (plane - State::kShared + kAxis) * kLanes; };
+    const V old = hn::Load(d, local(State::kD)), at = hn::Load(d, shared(State::kX));
     const V drift = hn::Set(d, law_.drift[kAxis]);
     V change = hn::MulAdd(force, step2, hn::IfThenElseZero(hn::Gt(step2, hn::Zero(d)), drift));
     if (law_.drag > 0) {
@@ -515,19 +520,19 @@ class Sweep {
 
     V next = hn::Zero(d), there = hn::Zero(d);
     if (law_.compensated) {
-      const V add = hn::Sub(change, hn::Load(d, own(State::kDError)));
+      const V add = hn::Sub(change, hn::Load(d, local(State::kDError)));
       next = hn::Add(old, add);
-      hn::Store(hn::Sub(hn::Sub(next, old), add), d, own(State::kDError));
-      const V by = hn::Sub(next, hn::Load(d, own(State::kXError)));
+      hn::Store(hn::Sub(hn::Sub(next, old), add), d, local(State::kDError));
+      const V by = hn::Sub(next, hn::Load(d, local(State::kXError)));
       there = hn::Add(at, by);
-      hn::Store(hn::Sub(hn::Sub(there, at), by), d, own(State::kXError));
+      hn::Store(hn::Sub(hn::Sub(there, at), by), d, local(State::kXError));
     } else {
       next = hn::Add(old, change);
       there = hn::Add(at, next);
     }
-    hn::Store(hn::MulSub(hn::Set(d, T(3)), next, old), d, seen(State::kW));
-    hn::Store(next, d, own(State::kD));
-    hn::Store(there, d, seen(State::kX));
+    hn::Store(hn::MulSub(hn::Set(d, T(3)), next, old), d, shared(State::kW));
+    hn::Store(next, d, local(State::kD));
+    hn::Store(there, d, shared(State::kX));
     return next;
   }
 
@@ -536,8 +541,8 @@ class Sweep {
   SweepBand<T>& band_;
   const int vectors_;
   const bool fetches_;
-  const int planes_;  // those that neighbours look at
-  T *const forces_, *const heard_;
+  const int planes_;  // of the shared ones, those that are used
+  T *const forces_, *const velocity_sums_;
   std::array<Halo, 2 * kHalo> halo_;
   V largest_;  // |d|^2, m^2
 };

@@ -10,6 +10,7 @@
 #include "client/commands/commands.h"
 #include "client/exports/output_file.h"
 #include "client/input_file.h"
+#include "client/load/limit.h"
 #include "client/load/load_page.h"
 #include "client/output/status.h"
 #include "client/output/text.h"

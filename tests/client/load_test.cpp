@@ -7,6 +7,7 @@
 
 #include "client/connection.h"
 #include "client/input_file.h"
+#include "client/load/limit.h"
 #include "tests/client/breaking_proxy.h"
 #include "tests/client/client_test.h"
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <thread>
 
+#include "client/load/limit.h"
 #include "client/load/load.h"
 #include "client/output/text.h"
 #include "client/templates/templates.h"

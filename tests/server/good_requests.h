@@ -1,0 +1,24 @@
+#pragma once
+
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/message.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "weft/v1/scene.pb.h"
+
+namespace weft::testing {
+
+// A scene with every field of the interface in it.
+v1::Scene full_scene();
+
+// Good requests of a type, as text; of a type that has none here they are made up from its fields.
+std::vector<std::string> known_requests(const std::string& type);
+
+// The same as messages.
+std::vector<std::unique_ptr<google::protobuf::Message>> good_requests(
+    const google::protobuf::Descriptor& type);
+
+}  // namespace weft::testing

@@ -8,15 +8,12 @@
 
 #include "client/exports/frame_writer.h"
 #include "client/problem.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 namespace {
 
 constexpr double kSameTime = 1e-9;  // s
-
-std::size_t particles_of(const v1::SheetLayout& sheet) {
-  return static_cast<std::size_t>(sheet.rows()) * static_cast<std::size_t>(sheet.columns());
-}
 
 // The particles that are exported, and their sheets counted from the first of them.
 struct Part {
@@ -34,7 +31,7 @@ Part find_part(const RecordingReader& recording, const std::string& name) {
     if (part.sheets.empty()) part.first = static_cast<std::size_t>(sheet.first_particle());
     part.sheets.push_back(sheet);
     part.sheets.back().set_first_particle(static_cast<std::int32_t>(part.count));
-    part.count += particles_of(sheet);
+    part.count += particle_count(sheet);
   }
   if (part.sheets.empty()) {
     throw usage_problem(

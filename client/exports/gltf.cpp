@@ -8,7 +8,7 @@
 #include <string_view>
 
 #include "client/exports/frame_writer.h"
-#include "client/exports/mesh.h"
+#include "client/exports/normals.h"
 #include "client/exports/output_file.h"
 #include "client/output/json.h"
 #include "client/problem.h"

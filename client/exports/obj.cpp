@@ -5,9 +5,9 @@
 #include <system_error>
 
 #include "client/exports/frame_writer.h"
-#include "client/exports/mesh.h"
 #include "client/exports/output_file.h"
 #include "client/problem.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 namespace {
@@ -38,9 +38,8 @@ class ObjWriter : public FrameWriter {
     std::string text;
     for (const auto& sheet : sheets_) {
       text += "o " + sheet.name() + '\n';
-      const auto particles =
-          static_cast<std::size_t>(sheet.rows()) * static_cast<std::size_t>(sheet.columns());
-      add_vertices(text, frame.points, static_cast<std::size_t>(sheet.first_particle()), particles);
+      add_vertices(text, frame.points, static_cast<std::size_t>(sheet.first_particle()),
+                   particle_count(sheet));
       add_quads(text, sheet);
     }
     OutputFile file(directory_ / fmt::format("cloth_{:06}.obj", frame.number));

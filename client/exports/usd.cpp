@@ -8,9 +8,9 @@
 #include <set>
 
 #include "client/exports/frame_writer.h"
-#include "client/exports/mesh.h"
 #include "client/exports/output_file.h"
 #include "client/problem.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 namespace {

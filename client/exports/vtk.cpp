@@ -6,9 +6,9 @@
 #include <system_error>
 
 #include "client/exports/frame_writer.h"
-#include "client/exports/mesh.h"
 #include "client/exports/output_file.h"
 #include "client/problem.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 namespace {

@@ -17,6 +17,7 @@
 #include "client/recording/points.h"
 #include "client/recording/reader.h"
 #include "client/recording/tally.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 
@@ -43,8 +44,7 @@ struct Survey {
 
 std::size_t particles_of(const v1::StreamHeader& header) {
   std::size_t particles = 0;
-  for (const auto& sheet : header.sheets())
-    particles += static_cast<std::size_t>(sheet.rows()) * static_cast<std::size_t>(sheet.columns());
+  for (const auto& sheet : header.sheets()) particles += particle_count(sheet);
   return particles;
 }
 

@@ -9,6 +9,7 @@
 #include "client/output/text.h"
 #include "client/problem.h"
 #include "client/recording/points.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 namespace {
@@ -20,7 +21,7 @@ namespace {
 }
 
 std::string sheet_text(const v1::SheetLayout& sheet) {
-  return fmt::format("{} ({} x {} particles)", sheet.name(), sheet.rows(), sheet.columns());
+  return fmt::format("{} ({})", sheet.name(), shape_text(sheet));
 }
 
 std::string frames_text(const RecordingReader& recording) {
@@ -51,15 +52,14 @@ void check_layouts(const RecordingReader& a, const RecordingReader& b) {
 
 struct Place {
   std::string sheet;
-  int row = 0;
-  int column = 0;
+  GridPlace at;
 };
 
 Place place_of(const v1::StreamHeader& header, std::size_t particle) {
   for (const auto& sheet : header.sheets()) {
-    const int index = static_cast<int>(particle) - sheet.first_particle();
-    if (index < sheet.rows() * sheet.columns())
-      return {sheet.name(), index / sheet.columns(), index % sheet.columns()};
+    const std::size_t index = particle - static_cast<std::size_t>(sheet.first_particle());
+    if (index < particle_count(sheet))
+      return {sheet.name(), place_in(sheet, static_cast<int>(index))};
   }
   throw std::logic_error("no such particle");
 }
@@ -118,8 +118,8 @@ Comparison compare(RecordingReader& a, RecordingReader& b, const FrameRange& ran
       result.time_s = left.time_s();
       const Place place = place_of(a.header(), found.particle);
       result.sheet = place.sheet;
-      result.row = place.row;
-      result.column = place.column;
+      result.row = place.at.row;
+      result.column = place.at.column;
     }
     if (!result.first_unequal && left.SerializeAsString() != right.SerializeAsString())
       result.first_unequal = number;

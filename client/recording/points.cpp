@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "client/problem.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 namespace {
@@ -106,9 +107,9 @@ std::size_t particle_count(const v1::StreamHeader& header) {
   bool sound = header.start_frame() >= 0 && header.start_frame() <= kLastStart;
   sound = sound && is_known(header.format());
   for (const auto& sheet : header.sheets()) {
-    sound = sound && sheet.rows() > 0 && sheet.columns() > 0 && sheet.first_particle() == particles;
+    sound = sound && is_sound(sheet) && sheet.first_particle() == particles;
     if (!sound) break;
-    particles += std::int64_t{sheet.rows()} * sheet.columns();
+    particles += static_cast<std::int64_t>(particle_count(sheet));
     sound = particles <= kMostParticles;
   }
   if (!sound || particles == 0) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "client/problem.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 namespace {
@@ -177,8 +178,7 @@ Stage read_stage(RecordingReader& recording, std::int64_t number, Colouring colo
     const v1::SheetLayout& layout = header.sheets(i);
     const v1::Sheet& sheet = recording.scene().sheets(i);
     const auto first = static_cast<std::size_t>(layout.first_particle());
-    const std::size_t count =
-        static_cast<std::size_t>(layout.rows()) * static_cast<std::size_t>(layout.columns());
+    const std::size_t count = particle_count(layout);
     const Points points = read_points(frame.positions_m(), header, first, count);
     for (std::size_t k = 0; k < count; ++k) {
       if (!std::isfinite(points.x[k] + points.y[k] + points.z[k]))

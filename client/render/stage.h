@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "client/exports/mesh.h"
+#include "client/exports/normals.h"
 #include "client/recording/points.h"
 #include "client/recording/reader.h"
 #include "client/render/body.h"

@@ -204,7 +204,8 @@ SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes
     auto& pins = simulation.constraints.pins.emplace_back();
     for (const auto& pin : each.pins()) pins.push_back(to_pin(pin));
   }
-  for (const auto& each : from.paths()) simulation.constraints.paths.push_back(to_path(each.path()));
+  for (const auto& each : from.paths())
+    simulation.constraints.paths.push_back(to_path(each.path()));
   for (const auto& each : from.grabs()) {
     simulation.constraints.grips.push_back(
         {static_cast<std::size_t>(each.sheet()), each.particle(), each.hand(), each.pinned()});

@@ -288,7 +288,8 @@ TEST_F(CommandsTest, ATextileMayBeginWithAnotherAndItsValuesAreChecked) {
   const Outcome refused = run_weft({"textile", "new", "-o", path("bad.json"), "--from",
                                     "wool_tropical", "--areal-density", "-1"});
   EXPECT_EQ(refused.exit, 1);
-  EXPECT_THAT(refused.err, HasSubstr("--areal-density: -1 kg/m^2 is not within 1e-04 to 100 kg/m^2"));
+  EXPECT_THAT(refused.err,
+              HasSubstr("--areal-density: -1 kg/m^2 is not within 1e-04 to 100 kg/m^2"));
   EXPECT_FALSE(std::filesystem::exists(path("bad.json")));
 }
 

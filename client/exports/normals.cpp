@@ -1,31 +1,8 @@
-#include "client/exports/mesh.h"
+#include "client/exports/normals.h"
 
 #include <cmath>
 
 namespace weft::client {
-
-std::vector<Quad> quads_of(const v1::SheetLayout& sheet) {
-  std::vector<Quad> quads;
-  for (int row = 0; row + 1 < sheet.rows(); ++row) {
-    for (int column = 0; column + 1 < sheet.columns(); ++column) {
-      const int corner = sheet.first_particle() + row * sheet.columns() + column;
-      const int below = corner + sheet.columns();
-      quads.push_back({corner, below, below + 1, corner + 1});
-    }
-  }
-  return quads;
-}
-
-std::vector<std::uint32_t> triangles_of(const std::vector<v1::SheetLayout>& sheets) {
-  std::vector<std::uint32_t> triangles;
-  for (const auto& sheet : sheets) {
-    for (const Quad& quad : quads_of(sheet)) {
-      for (const std::size_t corner : {0U, 1U, 2U, 0U, 2U, 3U})
-        triangles.push_back(static_cast<std::uint32_t>(quad[corner]));
-    }
-  }
-  return triangles;
-}
 
 std::vector<std::array<float, 3>> normals_of(const Points& points,
                                              const std::vector<std::uint32_t>& triangles) {

@@ -16,7 +16,7 @@ namespace weft::client {
 // has lost the session to another.
 class FrameFeed {
  public:
-  // Gives up when nothing is heard for that time after a stream broke.
+  // Gives up when nothing is received for that time after a stream broke.
   FrameFeed(Connection& connection, v1::StreamFramesRequest request, std::chrono::seconds patience);
   // With a stop of its own instead of the connection's.
   FrameFeed(Connection& connection, v1::StreamFramesRequest request, std::chrono::seconds patience,

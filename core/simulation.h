@@ -85,9 +85,9 @@ class Simulation {
 
   // Changes the textile of a sheet between frames: positions and velocities stay, the step is
   // planned anew. Over `duration`, s, the textile changes with every frame, from what it is now, in
-  // the next one for the first time; a change under way ends where it has come. Changes nothing and
-  // returns the refusal when the step for the textile must not be run. Steps that both ends bear,
-  // all between them do: stiffness, damping and mass are linear in a textile's values.
+  // the next one for the first time; a change under way ends with its present values. Changes
+  // nothing and returns the refusal when the step for the textile must not be run. Steps that both
+  // ends bear, all between them do: stiffness, damping and mass are linear in a textile's values.
   // Precondition: find_problems(textile, "") is empty; index < scene().sheets.size(); with a
   // duration both textiles are measured, or both raw.
   std::optional<StepRefusal> set_textile(std::size_t index, const Textile& textile,

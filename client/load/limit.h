@@ -20,8 +20,8 @@ struct Probe {
 };
 
 // The largest number of sessions that held, within 5 %; 0: not even one. Doubles the number until
-// one does not hold, then halves the interval. `order` says all but the number; `tried` hears of
-// every load.
+// one does not hold, then halves the interval. `order` says all but the number; `tried` is
+// called after every load.
 int find_limit(Connection& connection, LoadOrder order, const LimitSearch& search,
                const std::function<void(const Probe&)>& tried,
                const std::function<void(int sessions, const LoadResult&)>& progress = {});

@@ -33,8 +33,8 @@ struct LoadOrder {
   std::chrono::duration<double> ramp{1};       // of a stage: it creates its sessions, evenly
   std::chrono::duration<double> duration{10};  // of a stage, after the ramp
   std::chrono::duration<double> grace{10};     // for answers and frames under way at the end
-  // Hears of every frame received: of which session and subscriber, from 0. Called from any thread,
-  // for one subscriber in order.
+  // Called with every frame received: of which session and subscriber, from 0. Called from any
+  // thread, for one subscriber in order.
   std::function<void(int session, int subscriber, const v1::Frame&)> on_frame{};
 
   std::vector<int> sessions_of_stages() const {

@@ -32,7 +32,7 @@ struct RenderOrder {
   Colouring colouring = Colouring::kCloth;
 };
 
-// How the values of a colouring are told.
+// How the values of a colouring are labelled.
 struct ColourScale {
   const char* name;
   const char* title;  // in a picture

@@ -25,7 +25,7 @@ class Player {
     std::optional<std::int64_t> until_frame = {};
     bool until_rest = false;
   };
-  // How far it has come.
+  // Where it stands.
   struct Place {
     v1::SessionState state = v1::SESSION_STATE_PAUSED;
     std::shared_ptr<const Frame> newest;

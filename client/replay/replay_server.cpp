@@ -257,7 +257,7 @@ class FrameReplay final : public v1::FrameService::Service {
           writer_(writer),
           order_{.format = header.format(), .most_bytes = Limits().max_frame_bytes} {
       for (const auto& sheet : header.sheets())
-        order_.sheets.push_back(Grid{.rows = sheet.rows(), .columns = sheet.columns()});
+        order_.sheets.emplace_back(Grid{.rows = sheet.rows(), .columns = sheet.columns()});
       Response message;
       *message.mutable_header() = header;
       write(message);

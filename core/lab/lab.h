@@ -58,7 +58,7 @@ std::vector<Problem> find_problems(const LabOrder& order);
 // Who waits for a test.
 struct LabWatch {
   std::stop_token stop;
-  std::function<void(int done, int specimens)> progress;  // told before each specimen; or empty
+  std::function<void(int done, int specimens)> progress;  // called before each specimen; or empty
 };
 
 // Precondition: find_problems(order) is empty. On a stop it ends soon, with what it has.

@@ -33,7 +33,7 @@ class Access {
   // std::runtime_error with path and line of what is wrong.
   Access(const std::optional<std::string>& tokens, bool by_certificate);
 
-  // The caller, or why he is not heard.
+  // The caller, or why the call is refused.
   std::variant<Caller, grpc::Status> caller(const grpc::ServerContextBase& context) const;
 
  private:

@@ -3,6 +3,8 @@
 #include <string>
 
 #include "core/model/text.h"
+#include "server/convert/names.h"
+#include "server/rpc/errors.h"
 
 namespace weft {
 
@@ -33,6 +35,13 @@ std::vector<Problem> find_problems(const v1::ViewFramesRequest& request, int ope
     return {{"credits",
              std::to_string(open_credits + credits) + " would be open; at most " + most + " are"}};
   return {};
+}
+
+std::optional<grpc::Status> refusal_of_id(const std::string& field, const std::string& id) {
+  if (id.empty() || is_session_id(id)) return std::nullopt;
+  return errors::field_invalid(field, "\"" + id +
+                                          "\" is not 1 to 63 characters of a-z, 0-9 and -, "
+                                          "beginning with a letter");
 }
 
 }  // namespace weft

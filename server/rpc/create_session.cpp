@@ -2,10 +2,12 @@
 #include <mutex>
 #include <utility>
 
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
+#include "server/convert/names.h"
+#include "server/convert/numerics.h"
+#include "server/rpc/checks.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/find.h"
-#include "server/rpc/names.h"
 #include "server/rpc/server_service.h"
 #include "server/rpc/session_service.h"
 #include "server/rpc/unary_call.h"

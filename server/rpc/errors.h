@@ -32,7 +32,7 @@ grpc::Status request_used();
 grpc::Status message_malformed(const std::string& type);
 
 grpc::Status session_not_found(const std::string& name);
-// Whether there is such a session is not told.
+// Does not say whether there is such a session.
 grpc::Status session_not_yours(const std::string& name);
 grpc::Status session_exists(const std::string& name);
 grpc::Status session_damaged(const std::string& name, const std::string& why);

@@ -7,8 +7,8 @@
 #include <mutex>
 #include <utility>
 
+#include "server/convert/names.h"
 #include "server/rpc/errors.h"
-#include "server/rpc/names.h"
 #include "server/rpc/restore.h"
 
 namespace weft {

@@ -2,11 +2,12 @@
 
 #include <utility>
 
+#include "server/convert/convert.h"
+#include "server/convert/names.h"
+#include "server/convert/numerics.h"
 #include "server/rpc/bytes.h"
-#include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/frame_streams.h"
-#include "server/rpc/names.h"
 #include "server/rpc/server_service.h"
 
 namespace weft {

@@ -3,8 +3,8 @@
 #include <string>
 #include <utility>
 
+#include "server/convert/convert.h"
 #include "server/rpc/bytes.h"
-#include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
 
 namespace weft {

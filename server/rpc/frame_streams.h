@@ -19,7 +19,7 @@ class FrameCall;
 // The open calls that send frames. A thread of its own reminds them of Progress.
 class FrameStreams {
  public:
-  // With kTick later a reader hears something every two seconds.
+  // With kTick, readers get a message at least every two seconds.
   static constexpr std::chrono::milliseconds kTick{250};
   static constexpr std::chrono::milliseconds kProgressInterval{1750};
   static constexpr std::chrono::milliseconds kLongFrameInterval{400};

@@ -4,10 +4,10 @@
 #include <string>
 #include <utility>
 
+#include "server/convert/convert.h"
+#include "server/convert/names.h"
 #include "server/rpc/bytes.h"
-#include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
-#include "server/rpc/names.h"
 #include "server/rpc/session_service.h"
 
 namespace weft {

@@ -8,7 +8,7 @@
 #include <variant>
 
 #include "core/lab/lab.h"
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
 #include "server/rpc/errors.h"
 
 namespace weft {

@@ -7,7 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "server/rpc/names.h"
+#include "server/convert/names.h"
+#include "server/convert/numerics.h"
 #include "server/rpc/server_service.h"
 
 namespace weft {

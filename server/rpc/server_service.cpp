@@ -3,19 +3,11 @@
 #include <sstream>
 
 #include "core/fingerprint.h"
+#include "server/convert/numerics.h"
 #include "server/rpc/server_stats.h"
 #include "server/rpc/unary_call.h"
 
 namespace weft {
-
-std::string numerics_id() {
-  static const std::string id = [] {
-    std::ostringstream text;
-    text << "weft-" WEFT_VERSION "-" << std::hex << fingerprint();
-    return text.str();
-  }();
-  return id;
-}
 
 grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerContext* context,
                                                        const v1::GetServerInfoRequest*,

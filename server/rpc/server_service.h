@@ -5,9 +5,6 @@
 
 namespace weft {
 
-// Frames of servers with equal ids are equal to the bit.
-std::string numerics_id();
-
 class ServerService final : public v1::ServerService::CallbackService {
  public:
   explicit ServerService(const Backend& backend) : backend_(backend) {}

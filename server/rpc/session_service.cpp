@@ -4,12 +4,12 @@
 #include <utility>
 
 #include "core/model/text.h"
+#include "server/convert/convert.h"
+#include "server/convert/names.h"
 #include "server/rpc/checks.h"
-#include "server/rpc/convert.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/find.h"
 #include "server/rpc/interaction.h"
-#include "server/rpc/names.h"
 #include "server/rpc/unary_call.h"
 
 namespace weft {

@@ -14,8 +14,8 @@
 
 namespace weft {
 
-// How far ahead of the newest frame the log is told that frames may be published: so far that it is
-// told about once in `interval`. Not thread-safe.
+// How far ahead of the newest frame the publish limit is put: so far that it is written about once
+// in `interval`. Not thread-safe.
 class PublishAhead {
  public:
   // frame_step: s.
@@ -31,7 +31,7 @@ class PublishAhead {
   }
   std::int64_t frames() const { return ahead_; }
 
-  // The limit was come to.
+  // The frames have nearly reached the limit.
   void note_used_up(Clock::time_point now) {
     if (now - told_ < interval_) ahead_ = std::min(2 * ahead_, kMost);
     if (now - told_ > 4 * interval_) ahead_ = std::max(ahead_ / 2, kLeast);

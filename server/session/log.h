@@ -93,7 +93,7 @@ class SessionLog {
   using Kept = std::function<void(const std::string& error, const NamedSnapshot& snapshot)>;
   virtual void keep(const std::string& id, std::shared_ptr<const SessionSnapshot> snapshot,
                     const Kept& kept) = 0;
-  // Forgets one that did not come to count.
+  // Deletes one that no entry refers to.
   virtual void drop(const std::string& id) = 0;
 };
 

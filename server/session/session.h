@@ -68,7 +68,7 @@ struct SavedSession {
   std::int64_t entries() const { return first + static_cast<std::int64_t>(log.size()); }
 };
 
-// Hears what an operator should know: repairs and failures, a line each. Called from any thread,
+// Receives what an operator should know: repairs and failures, a line each. Called from any thread,
 // with no lock held. Must not block.
 using Notify = std::function<void(const std::string& line)>;
 
@@ -81,8 +81,8 @@ struct SessionHost {
   // Computing between two snapshots; a session of more than 20 000 particles has them more rarely.
   std::chrono::duration<double> snapshot_after{2};
   std::size_t max_snapshots = 16;  // on demand
-  // The log is not told more often how far frames may be published, and the session goes on for
-  // about as long without an answer.
+  // The publish limit is not written more often, and the session goes on for about as long without
+  // an answer.
   static constexpr std::chrono::duration<double> kLimitInterval{0.5};
   std::chrono::duration<double> limit_interval = kLimitInterval;
   // Frames that all subscribers had taken longer ago are not there any more after a restart.

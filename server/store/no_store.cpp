@@ -2,7 +2,7 @@
 #include <mutex>
 #include <utility>
 
-#include "server/rpc/server_service.h"
+#include "server/convert/numerics.h"
 #include "server/store/records.h"
 #include "server/store/store.h"
 

@@ -31,7 +31,6 @@ using std::chrono::milliseconds;
 constexpr milliseconds kLease{3000}, kRenewal{400};
 constexpr milliseconds kFirstPause{50}, kLongestPause{1000};  // before work is tried again
 constexpr int kOrphans = 4;                                   // that are named at a time
-constexpr std::int64_t kFewEntries = 256;                     // that are not worth forgetting
 
 const std::vector<PostgresConnection::Statement> kLogStatements = {
     {"progress",
@@ -245,7 +244,7 @@ class PostgresStore::Log final : public SessionLog {
                 "DELETE FROM weft.entry e USING weft.session s WHERE e.uid = $1 AND e.number < $2 "
                 "AND s.uid = $1 AND s.owner = $3 AND s.epoch = $4 AND $2 >= $5 + "
                 "(SELECT min(number) FROM weft.entry WHERE uid = $1)",
-                uid, entries, tenure.owner, tenure.epoch, kFewEntries);
+                uid, entries, tenure.owner, tenure.epoch, records::kFewEntries);
             return true;
           },
           [](const std::string&) {});

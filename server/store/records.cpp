@@ -3,7 +3,7 @@
 #include <google/protobuf/util/time_util.h>
 #include <zlib.h>
 
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
 #include "weft/storage/v1/storage.pb.h"
 
 namespace weft::records {

@@ -14,6 +14,9 @@
 // which this version understands.
 namespace weft::records {
 
+// Entries of a log that are not worth forgetting.
+inline constexpr std::int64_t kFewEntries = 256;
+
 struct Progress {
   std::int64_t entries = 0;
   PublishLimit limit;

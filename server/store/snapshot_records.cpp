@@ -8,8 +8,8 @@
 #include <variant>
 #include <vector>
 
-#include "server/rpc/convert.h"
-#include "server/rpc/server_service.h"
+#include "server/convert/convert.h"
+#include "server/convert/numerics.h"
 #include "server/session/snapshot.h"
 #include "server/store/records.h"
 #include "weft/storage/v1/storage.pb.h"

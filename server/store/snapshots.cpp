@@ -9,7 +9,7 @@
 #include <tuple>
 #include <utility>
 
-#include "server/rpc/server_service.h"
+#include "server/convert/numerics.h"
 #include "server/store/records.h"
 #include "server/store/store.h"
 

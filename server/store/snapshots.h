@@ -80,7 +80,7 @@ class Snapshots {
   void drop(const std::string& uid, const std::string& id);
   SessionSnapshot read(const std::string& uid, const std::string& id) const;
   // Those that were kept so and came before so many entries of the log, in order of frame. Later
-  // ones are removed: nobody was told of them.
+  // ones are removed: no call was answered with them.
   std::vector<NamedSnapshot> named(const std::string& uid, std::int64_t entries) const;
 
   void erase(const std::string& uid);

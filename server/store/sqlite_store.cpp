@@ -23,7 +23,6 @@ namespace {
 constexpr int kApplicationId = 0x57454644;  // "WEFD"
 constexpr int kVersion = 1;                 // user_version of the file
 constexpr int kMostRequests = 10'000;
-constexpr std::int64_t kFewEntries = 256;  // that are not worth forgetting
 constexpr const char* kTables = R"(
   CREATE TABLE session (
     uid TEXT PRIMARY KEY,
@@ -343,7 +342,7 @@ class SqliteStore::Log final : public SessionLog {
                             std::int64_t number) {
     SQLite::Statement first(database, "SELECT MIN(number) FROM entry WHERE uid = ?");
     first.bind(1, uid);
-    if (!first.executeStep() || number - first.getColumn(0).getInt64() < kFewEntries) return;
+    if (!first.executeStep() || number - first.getColumn(0).getInt64() < records::kFewEntries) return;
     SQLite::Statement erase(database, "DELETE FROM entry WHERE uid = ? AND number < ?");
     erase.bind(1, uid);
     erase.bind(2, number);

@@ -8,7 +8,7 @@
 
 #include "client/scene_file.h"
 #include "core/lattice/lattice.h"
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
 #include "tests/client/client_test.h"
 #include "tests/support/core/scenes.h"
 #include "tests/support/service/process.h"

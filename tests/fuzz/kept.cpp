@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
 #include "server/store/records.h"
 #include "tests/support/service/service.h"
 

@@ -9,7 +9,7 @@
 #include <variant>
 
 #include "core/simulation.h"
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
 
 namespace weft {
 namespace {

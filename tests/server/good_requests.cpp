@@ -7,6 +7,7 @@
 #include <map>
 
 #include "tests/server/mutations.h"
+#include "tests/support/service/service.h"
 #include "weft/v1/frame.pb.h"
 #include "weft/v1/lab.pb.h"
 #include "weft/v1/session.pb.h"

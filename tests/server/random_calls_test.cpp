@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
 #include "tests/support/service/service.h"
 #include "tests/support/temporary_directory.h"
 

@@ -12,12 +12,6 @@ namespace {
 
 using Sessions = Service::Sessions;
 
-std::string content(const std::string& path) {
-  std::ostringstream text;
-  text << std::ifstream(path, std::ios::binary).rdbuf();
-  return text.str();
-}
-
 TEST_F(Restart, LosesOnlyTheSessionThatIsDamaged) {
   v1::Scene scene = small_scene();
   const v1::Session good = service_->create(scene, "good");

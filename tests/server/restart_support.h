@@ -6,7 +6,9 @@
 #include <cctype>
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,6 +17,12 @@
 #include "tests/support/temporary_directory.h"
 
 namespace weft::testing {
+
+inline std::string content(const std::string& path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
 
 // A directory with sessions in it, and servers that take them over from each other.
 class Restart : public ::testing::Test {

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <variant>
 
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
 
 namespace weft::stress {
 namespace {

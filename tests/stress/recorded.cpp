@@ -5,7 +5,7 @@
 #include <variant>
 
 #include "client/recording/reader.h"
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
 #include "tests/stress/offline.h"
 
 namespace weft::stress {

@@ -1,7 +1,7 @@
 #include <google/protobuf/util/time_util.h>
 
-#include "server/rpc/convert.h"
-#include "server/rpc/names.h"
+#include "server/convert/convert.h"
+#include "server/convert/names.h"
 
 namespace weft {
 namespace {

@@ -5,7 +5,7 @@
 #include <iterator>
 #include <set>
 
-#include "server/rpc/convert.h"
+#include "server/convert/convert.h"
 #include "server/textiles/catalogue.h"
 
 namespace weft {

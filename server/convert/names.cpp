@@ -1,9 +1,7 @@
-#include "server/rpc/names.h"
+#include "server/convert/names.h"
 
 #include <algorithm>
 #include <random>
-
-#include "server/rpc/errors.h"
 
 namespace weft {
 namespace {
@@ -23,13 +21,6 @@ bool is_session_id(const std::string& id) {
   return !id.empty() && id.size() <= 63 && letter(id.front()) &&
          std::all_of(id.begin(), id.end(),
                      [&](char c) { return letter(c) || (c >= '0' && c <= '9') || c == '-'; });
-}
-
-std::optional<grpc::Status> refusal_of_id(const std::string& field, const std::string& id) {
-  if (id.empty() || is_session_id(id)) return std::nullopt;
-  return errors::field_invalid(field, "\"" + id +
-                                          "\" is not 1 to 63 characters of a-z, 0-9 and -, "
-                                          "beginning with a letter");
 }
 
 std::string snapshot_name(const std::string& session_id, const std::string& id) {

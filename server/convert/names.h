@@ -1,7 +1,5 @@
 #pragma once
 
-#include <grpcpp/support/status.h>
-
 #include <optional>
 #include <string>
 
@@ -15,8 +13,6 @@ std::string id_of(const std::string& name);
 
 // 1 to 63 characters of [a-z0-9-], beginning with a letter; of snapshots, too.
 bool is_session_id(const std::string& id);
-// What is wrong with an id that a caller gave; empty: the server picks one.
-std::optional<grpc::Status> refusal_of_id(const std::string& field, const std::string& id);
 
 std::string snapshot_name(const std::string& session_id, const std::string& id);
 

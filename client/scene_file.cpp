@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "client/input_file.h"
 #include "client/json_file.h"
 #include "client/output/json.h"
 #include "client/problem.h"
@@ -31,6 +32,9 @@ void refuse_mesh(const std::string& path) {
 
 v1::Scene read_scene(const std::string& path) {
   refuse_mesh(path);
+  const Json json = parse_json(path, read_text(path));
+  if (json.is_object() && json.contains("values") && !json.contains("sheets"))
+    throw malformed(path, "is a textile, not a scene; `weft scene new --textile` takes it");
   v1::Scene scene;
   read_json(path, scene);
   return scene;

@@ -198,9 +198,20 @@ void run_new_textile(Context& context, const NewTextileOptions& options) {
     for (const Property& property : kProperties)
       if (std::string_view(property.option) != "--air-drag") textile.add_missing(property.field);
   textile.clear_name();
-  for (std::size_t i = 0; i < kProperties.size(); ++i)
-    if (options.values[i])
-      set_property(kProperties[i], *options.values[i], options.source, textile);
+  std::vector<std::string> given;
+  for (std::size_t i = 0; i < kProperties.size(); ++i) {
+    if (!options.values[i]) continue;
+    set_property(kProperties[i], *options.values[i], options.source, textile);
+    given.emplace_back(kProperties[i].field);
+  }
+  if (!options.from.empty() && !given.empty()) {
+    textile.set_note(fmt::format("{} with values of its own: {}. Of the former: {}", options.from,
+                                 fmt::join(given, ", "),
+                                 textile.note().empty() ? "no note." : textile.note()));
+    textile.set_status("composed");
+  } else if (options.from.empty()) {
+    textile.set_status(options.source.empty() ? "assumed" : "measured");
+  }
   if (!options.display_name.empty()) textile.set_display_name(options.display_name);
   if (!options.composition.empty()) textile.set_composition(options.composition);
   if (textile.display_name().empty())

@@ -342,7 +342,8 @@ class SqliteStore::Log final : public SessionLog {
                             std::int64_t number) {
     SQLite::Statement first(database, "SELECT MIN(number) FROM entry WHERE uid = ?");
     first.bind(1, uid);
-    if (!first.executeStep() || number - first.getColumn(0).getInt64() < records::kFewEntries) return;
+    if (!first.executeStep() || number - first.getColumn(0).getInt64() < records::kFewEntries)
+      return;
     SQLite::Statement erase(database, "DELETE FROM entry WHERE uid = ? AND number < ?");
     erase.bind(1, uid);
     erase.bind(2, number);

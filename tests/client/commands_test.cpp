@@ -285,6 +285,9 @@ TEST_F(CommandsTest, ATextileMayBeginWithAnotherAndItsValuesAreChecked) {
   const auto wool = ask({"textile", "show", "wool_tropical"});
   EXPECT_EQ(own["values"]["areal_density_kg_per_m2"], 0.4);
   EXPECT_EQ(own["values"]["shear_n_per_m"], wool["values"]["shear_n_per_m"]);
+  EXPECT_THAT(own["note"].get<std::string>(),
+              HasSubstr("wool_tropical with values of its own: areal_density_kg_per_m2."));
+  EXPECT_THAT(run_weft({"scene", "check", file}).err, HasSubstr("is a textile, not a scene"));
   const Outcome refused = run_weft({"textile", "new", "-o", path("bad.json"), "--from",
                                     "wool_tropical", "--areal-density", "-1"});
   EXPECT_EQ(refused.exit, 1);

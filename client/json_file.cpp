@@ -37,6 +37,11 @@ Json parse_json(const std::string& path, const std::string& text) {
 void read_json(const std::string& path, google::protobuf::Message& into) {
   const std::string text = read_text(path);
   parse_json(path, text);
+  read_message(path, text, into);
+}
+
+void read_message(const std::string& path, const std::string& text,
+                  google::protobuf::Message& into) {
   const auto status = google::protobuf::util::JsonStringToMessage(text, &into);
   if (status.ok()) return;
 

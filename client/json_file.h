@@ -11,7 +11,9 @@ namespace weft::client {
 // Reads the protobuf JSON of a message. What cannot be understood is a Problem with file and line.
 void read_json(const std::string& path, google::protobuf::Message& into);
 
-// The same of any JSON; `text` is the file's.
+// The same in two steps, for those who look at the JSON first; `text` is the file's.
 Json parse_json(const std::string& path, const std::string& text);
+void read_message(const std::string& path, const std::string& text,
+                  google::protobuf::Message& into);
 
 }  // namespace weft::client

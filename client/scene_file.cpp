@@ -32,11 +32,12 @@ void refuse_mesh(const std::string& path) {
 
 v1::Scene read_scene(const std::string& path) {
   refuse_mesh(path);
-  const Json json = parse_json(path, read_text(path));
+  const std::string text = read_text(path);
+  const Json json = parse_json(path, text);
   if (json.is_object() && json.contains("values") && !json.contains("sheets"))
     throw malformed(path, "is a textile, not a scene; `weft scene new --textile` takes it");
   v1::Scene scene;
-  read_json(path, scene);
+  read_message(path, text, scene);
   return scene;
 }
 

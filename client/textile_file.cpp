@@ -28,12 +28,14 @@ v1::Textile textile_named(const std::string& preset_or_file) {
     textile.set_preset(preset_or_file);
     return textile;
   }
-  const Json json = parse_json(preset_or_file, read_text(preset_or_file));
+  const std::string text = read_text(preset_or_file);
+  const Json json = parse_json(preset_or_file, text);
   if (!json.is_object() || !json.contains("values")) {
-    read_json(preset_or_file, textile);
+    read_message(preset_or_file, text, textile);
     return textile;
   }
-  const v1::TextilePreset own = read_textile_file(preset_or_file);
+  v1::TextilePreset own;
+  read_message(preset_or_file, text, own);
   if (!own.missing().empty())
     throw malformed(preset_or_file,
                     fmt::format("values are missing: {}", fmt::join(own.missing(), ", ")));

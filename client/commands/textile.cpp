@@ -121,20 +121,21 @@ void run_set(Context& context, const SetOptions& options) {
 struct Property {
   const char* option;
   const char* field;  // of MeasuredTextile
+  const char* placeholder;
   const char* unit;
   const char* description;
 };
 constexpr std::array kProperties{
-    Property{"--areal-density", "areal_density_kg_per_m2", "KG_PER_M2", "Mass per area, kg/m^2"},
-    Property{"--tensile-warp", "tensile_warp_n_per_m", "N_PER_M",
-             "Tensile stiffness along the warp, N/m of width"},
-    Property{"--tensile-weft", "tensile_weft_n_per_m", "N_PER_M", "The same along the weft, N/m"},
-    Property{"--shear", "shear_n_per_m", "N_PER_M", "Shear stiffness, N/m per radian"},
-    Property{"--bend-warp", "bend_rigidity_warp_n_m", "N_M",
-             "Bending rigidity along the warp, N m"},
-    Property{"--bend-weft", "bend_rigidity_weft_n_m", "N_M", "The same along the weft, N m"},
-    Property{"--air-drag", "air_drag_kg_per_m2_s", "KG_PER_M2_S",
-             "Drag in still air, kg/(m^2 s) [0]"},
+    Property{"--areal-density", "areal_density_kg_per_m2", "KG_PER_M2", "kg/m^2", "Mass per area"},
+    Property{"--tensile-warp", "tensile_warp_n_per_m", "N_PER_M", "N/m",
+             "Tensile stiffness along the warp, by width"},
+    Property{"--tensile-weft", "tensile_weft_n_per_m", "N_PER_M", "N/m", "The same along the weft"},
+    Property{"--shear", "shear_n_per_m", "N_PER_M", "N/m", "Shear stiffness per radian"},
+    Property{"--bend-warp", "bend_rigidity_warp_n_m", "N_M", "N m",
+             "Bending rigidity along the warp"},
+    Property{"--bend-weft", "bend_rigidity_weft_n_m", "N_M", "N m", "The same along the weft"},
+    Property{"--air-drag", "air_drag_kg_per_m2_s", "KG_PER_M2_S", "kg/(m^2 s)",
+             "Drag in still air, 0 if absent"},
 };
 
 struct NewTextileOptions {
@@ -154,12 +155,9 @@ void set_property(const Property& property, double value, const std::string& sou
   auto& all = *textile.mutable_properties();
   const auto found = std::find_if(all.begin(), all.end(), same);
   v1::TextileProperty& entry = found == all.end() ? *all.Add() : *found;
-  const std::string_view description = property.description;
-  std::string unit(description.substr(description.rfind(", ") + 2));
-  unit.erase(std::min(unit.find(" ["), unit.size()));
   entry.set_field(property.field);
   entry.set_value(text);
-  entry.set_unit(unit);
+  entry.set_unit(property.unit);
   entry.set_status(source.empty() ? "assumed" : "measured");
   entry.set_source(source.empty() ? "given without a source" : source);
   auto& missing = *textile.mutable_missing();
@@ -176,17 +174,14 @@ void check_textile(Context& context, const v1::TextilePreset& textile) {
   try {
     create_session(context.connection(), make_template("hang", {.textile = values}), request);
   } catch (const Problem& problem) {
-    Problem placed(problem.exit, problem.code, problem.reason, problem.what());
-    for (auto [field, description] : problem.violations) {
+    if (problem.violations.empty()) throw;
+    std::vector<Violation> violations = problem.violations;
+    for (Violation& violation : violations)
       for (const Property& property : kProperties)
-        if (field.ends_with(property.field)) field = property.option;
-      placed.violations.push_back({field, description});
-    }
-    const Violation& first =
-        placed.violations.empty() ? Violation{"", problem.what()} : placed.violations.front();
-    Problem named(placed.exit, placed.code, placed.reason,
-                  first.field.empty() ? first.description : first.field + ": " + first.description);
-    named.violations = placed.violations;
+        if (violation.field.ends_with(property.field)) violation.field = property.option;
+    Problem named(problem.exit, problem.code, problem.reason,
+                  violations[0].field + ": " + violations[0].description);
+    named.violations = std::move(violations);
     throw named;
   }
 }
@@ -244,8 +239,10 @@ void add_new_textile(CLI::App& group, Context& context) {
   command->add_option("--source", options->source, "Where the values given come from")
       ->type_name("TEXT");
   for (std::size_t i = 0; i < kProperties.size(); ++i)
-    command->add_option(kProperties[i].option, options->values[i], kProperties[i].description)
-        ->type_name(kProperties[i].unit);
+    command
+        ->add_option(kProperties[i].option, options->values[i],
+                     fmt::format("{}, {}", kProperties[i].description, kProperties[i].unit))
+        ->type_name(kProperties[i].placeholder);
   command->footer(
       "`--textile FILE.json` takes it wherever it takes a preset: in scene new, textile\n"
       "set, lab and scripts. `weft textile show FILE.json` shows it.");

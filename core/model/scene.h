@@ -55,6 +55,7 @@ struct Pin {
 struct SheetDefinition {
   std::string name;
   SheetShape shape;
+  std::string asset;  // name of what holds the shape; empty: it has none
   Textile textile;
   BendingLaw bending;
   Vector3d origin = Vector3d::Zero();              // of particle 0, m

@@ -61,6 +61,7 @@ struct Pin {
 struct SheetDefinition {
   std::string name;
   SheetShape shape;
+  std::string asset;  // name of what holds the shape; empty: it has none
   Textile textile;
   std::vector<PanelTextile> panel_textiles;
   BendingLaw bending;

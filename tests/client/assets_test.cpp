@@ -22,12 +22,6 @@ ServerOptions with_host() {
   return options;
 }
 
-v1::Scene scene_of(const v1::MeshData& mesh) {
-  v1::Scene scene = small_scene();
-  *scene.mutable_sheets(0)->mutable_triangles()->mutable_data() = mesh;
-  return scene;
-}
-
 TEST(ClientAssets, AreSentOnceAndGoOnWhereAConnectionBroke) {
   constexpr int kBreaks = 3;
   Service service(with_host());

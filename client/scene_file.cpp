@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "client/assets.h"
 #include "client/input_file.h"
 #include "client/json_file.h"
 #include "client/output/json.h"
@@ -43,7 +44,9 @@ v1::Scene read_scene(const std::string& path) {
 
 v1::Session create_session(Connection& connection, const v1::Scene& scene,
                            v1::CreateSessionRequest request) try {
-  *request.mutable_session()->mutable_scene() = scene;
+  // nothing is to be left of a scene that is only looked at
+  *request.mutable_session()->mutable_scene() =
+      request.validate_only() ? scene : upload_meshes(connection, scene);
   return connection.call(&v1::SessionService::Stub::CreateSession, request);
 } catch (const Problem& problem) {
   if (problem.code == "RESOURCE_EXHAUSTED" && problem.reason.empty()) {  // of gRPC itself

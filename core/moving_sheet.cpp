@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/forces/air.h"
-#include "core/forces/springs.h"
+#include "core/forces/elastic.h"
 #include "core/motion/stability.h"
 
 namespace weft {
@@ -31,8 +31,7 @@ void MovingSheet::bind_forces(const Scene& scene) {
   dynamics.force = [&scene, this](double time, const Matrix3Xd& x, const Matrix3Xd& v,
                                   Matrix3Xd& force) {
     force.setZero(3, x.cols());
-    add_spring_forces(mesh, x, v, force);
-    if (!mesh.stencils.empty()) add_isometric_forces(mesh, x, force);
+    add_elastic_forces(mesh, x, v, force);
     if (scene.environment.wind) add_wind_forces(*scene.environment.wind, mesh, time, x, v, force);
   };
   dynamics.air = [&scene](double time) {

@@ -10,11 +10,19 @@
 #include "core/model/text.h"
 #include "core/motion/stability.h"
 #include "core/sheet_factory.h"
+#include "core/triangles/triangles.h"
+#include "core/triangles/warnings.h"
 
 namespace weft {
 namespace {
 
 std::string sheet_path(std::size_t index) { return "sheets[" + std::to_string(index) + "]"; }
+
+// Of a particle, at most, m^2/kg.
+double area_by_mass(const SheetDefinition& sheet, const Mesh& mesh) {
+  if (std::holds_alternative<Triangles>(sheet.shape)) return 1 / least_density(sheet);
+  return sheet.spacing() * sheet.spacing() / mesh.mass.minCoeff();
+}
 
 // Rate at which air damps a sheet that is nearly at rest, an upper estimate, 1/s. Verlet takes drag
 // centred, which no step is too long for.
@@ -24,9 +32,8 @@ double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& me
     rate += mesh.drag.cwiseQuotient(mesh.mass).maxCoeff();
   if (scene.environment.wind) {
     const Wind& wind = *scene.environment.wind;
-    const double h = sheet.spacing();
     const double speed = wind.velocity.norm() * (1 + wind.gust);
-    rate += (wind.air_density * speed + wind.tangential_drag) * h * h / mesh.mass.minCoeff();
+    rate += (wind.air_density * speed + wind.tangential_drag) * area_by_mass(sheet, mesh);
   }
   return rate;
 }
@@ -83,7 +90,7 @@ void describe_solver(const Scene& scene, const SheetDefinition& sheet, Plan& pla
       join(sheet.name, ": vector kernels in ", single ? "single" : "double", " precision"));
 }
 
-void describe_families(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan) {
+void describe_connections(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan) {
   const bool pushes = resists_compression(sheet.bending);
   const auto describe = [&](FamilyKind kind, const char* name, const std::string& why_idle) {
     std::size_t pulling = 0;
@@ -111,6 +118,13 @@ void describe_families(const SheetDefinition& sheet, const Mesh& mesh, Plan& pla
   } else {
     plan.skipped.push_back({join(sheet.name, ": isometric bend"), "the bending rigidity is 0"});
   }
+}
+
+void describe_forces(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan) {
+  if (std::holds_alternative<Triangles>(sheet.shape))
+    describe_surface(sheet, mesh, plan);
+  else
+    describe_connections(sheet, mesh, plan);
   if (mesh.damping > 0)
     plan.passes.push_back(join(sheet.name, ": damping"));
   else
@@ -224,12 +238,13 @@ void describe_stretch(const Scene& scene, std::size_t index, Plan& plan) {
   plan.stretch_costs.push_back({sheet.name, std::max(warp, weft)});
   if (!scene.solver.max_self_weight_strain) return;
   const double most = *scene.solver.max_self_weight_strain;
-  const Textile capped = cap_stretch(sheet, scene.environment, most);
-  if (capped == sheet.textile) return;
+  SheetDefinition capped = sheet;
+  cap_stretch(capped, scene.environment, most);
+  if (capped.textile == sheet.textile) return;
   plan.warnings.push_back(
       {"STRETCH_CAPPED", sheet_path(index) + ".textile",
        join("a tensile stiffness of ", tensile_text(sheet.textile), " is simulated as ",
-            tensile_text(capped), ", with which the sheet, hung by an edge, stretches by ",
+            tensile_text(capped.textile), ", with which the sheet, hung by an edge, stretches by ",
             100 * most, " % under its own weight (solver.max_self_weight_strain)")});
 }
 
@@ -287,8 +302,12 @@ void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
            "stretched by half for good. A finer grid, a larger skin_m or a capsule along the "
            "edge helps"});
   for (std::size_t s = 0; s < planned.size(); ++s) {
-    warn_of_bending(scene, s, planned[s].mesh, plan);
-    warn_of_tension(scene.sheets[s], s, plan);
+    if (std::holds_alternative<Triangles>(scene.sheets[s].shape)) {
+      warn_of_triangles(scene, s, planned[s], steps[s].limiting_particle, plan);
+    } else {
+      warn_of_bending(scene, s, planned[s].mesh, plan);
+      warn_of_tension(scene.sheets[s], s, plan);
+    }
     warn_of_damping(scene, planned, s, steps[s], plan);
     describe_stretch(scene, s, plan);
   }
@@ -316,7 +335,7 @@ Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
     plan.dampings.push_back(
         {scene.sheets[s].name, sheets[s].mesh.damping, steps[s].connection_ratio});
     describe_solver(scene, scene.sheets[s], plan);
-    describe_families(scene.sheets[s], sheets[s].mesh, plan);
+    describe_forces(scene.sheets[s], sheets[s].mesh, plan);
     plan.particle_substeps += scene.sheets[s].particle_count() / plan.step.substep;
   }
   const auto pass = [&](const char* name, bool runs, const char* why_not) {

@@ -13,13 +13,13 @@ namespace weft {
 
 Mesh make_mesh(const SheetDefinition& sheet);
 
-// Makes what moves a sheet; `dynamics` outlives it.
+// Makes what moves a sheet, of which `mesh` was made; `dynamics` outlives it.
 using SolverFactory = std::function<std::unique_ptr<SheetSolver>(
-    const Scene& scene, const SheetDefinition& sheet, const Dynamics& dynamics)>;
+    const Scene& scene, const SheetDefinition& sheet, const Mesh& mesh, const Dynamics& dynamics)>;
 
 // The fastest that can.
 std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefinition& sheet,
-                                         const Dynamics& dynamics);
+                                         const Mesh& mesh, const Dynamics& dynamics);
 
 // Why only the plain solver can move a sheet; empty where vectors can.
 std::string_view needs_plain_solver(const Scene& scene, const SheetDefinition& sheet);

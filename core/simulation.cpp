@@ -6,7 +6,7 @@
 
 #include "core/contact/contact.h"
 #include "core/forces/air.h"
-#include "core/forces/springs.h"
+#include "core/forces/elastic.h"
 #include "core/model/self_weight.h"
 #include "core/simulation_state.h"
 
@@ -183,7 +183,7 @@ bool Simulation::State::quiet(const NextStates& next) const {
 SheetDefinition Simulation::State::capped(std::size_t sheet) const {
   SheetDefinition definition = scene.sheets[sheet];
   if (const auto& strain = scene.solver.max_self_weight_strain)
-    definition.textile = cap_stretch(definition, scene.environment, *strain);
+    cap_stretch(definition, scene.environment, *strain);
   return definition;
 }
 
@@ -216,7 +216,7 @@ Simulation::State::State(Scene given, SolverFactory factory)
     const SheetDefinition definition = simulated(s);
     Matrix3Xd v = start_velocities(definition);
     set_pin_velocities(definition.pins, 0, dt, v);
-    sheets[s].solver = make_solver(scene, definition, sheets[s].dynamics);
+    sheets[s].solver = make_solver(scene, definition, sheets[s].mesh, sheets[s].dynamics);
     sheets[s].solver->start(x[s], v, 0, dt);
     sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
   }
@@ -352,8 +352,8 @@ FrameStats Simulation::stats() const {
   for (const MovingSheet& sheet : state_->sheets) {
     const Matrix3Xd& x = sheet.good().x;
     stats.kinetic_energy += sheet.good().kinetic_energy;
-    stats.potential_energy += spring_energy(sheet.mesh, x) + isometric_energy(sheet.mesh, x) -
-                              sheet.mesh.mass.dot(x.transpose() * sheet.dynamics.gravity);
+    stats.potential_energy +=
+        elastic_energy(sheet.mesh, x) - sheet.mesh.mass.dot(x.transpose() * sheet.dynamics.gravity);
     stats.largest_strain = std::max(stats.largest_strain, largest_strain(sheet.mesh, x));
   }
   return stats;

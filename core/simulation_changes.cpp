@@ -60,7 +60,8 @@ std::optional<StepRefusal> Simulation::State::set_textile(std::size_t sheet,
     return refused;
   }
   plan = std::move(made);
-  sheets[sheet].solver = make_solver(scene, simulated(sheet), sheets[sheet].dynamics);
+  sheets[sheet].solver =
+      make_solver(scene, simulated(sheet), sheets[sheet].mesh, sheets[sheet].dynamics);
   std::vector<bool> changed(sheets.size());
   changed[sheet] = true;
   restart(before, dt, changed);

@@ -40,7 +40,7 @@ void Simulation::State::go_back_to(const Snapshot& before) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     if (scene.sheets[s].textile == before.sheets[s].textile) continue;
     put_textile(s, before.sheets[s].textile);
-    sheets[s].solver = make_solver(scene, simulated(s), sheets[s].dynamics);
+    sheets[s].solver = make_solver(scene, simulated(s), sheets[s].mesh, sheets[s].dynamics);
   }
   [[maybe_unused]] const bool taken = adopt(before);
   assert(taken);

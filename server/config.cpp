@@ -32,6 +32,7 @@ std::vector<Number> numbers(Config& config) {
   ServerOptions& server = config.server;
   Limits& limits = server.limits;
   constexpr std::int64_t kMiB = 1 << 20, kMostParticles = 1'000'000'000;
+  constexpr std::int64_t kMostAssets = kMiB << 24;
   constexpr std::int64_t kMostFrameWork = kMostParticles * kMaxSubsteps;
   return {
       {"port", &server.port, 0, 65535, "Port to listen on; 0 takes a free one"},
@@ -52,6 +53,13 @@ std::vector<Number> numbers(Config& config) {
        "Streams of one principal at a time"},
       {"max_snapshots_per_session", &limits.max_snapshots_per_session, 1, 1000,
        "Snapshots on demand of one session"},
+      {"max_asset_bytes", &limits.max_asset_bytes, kMiB, 1024 * kMiB, "Bytes of one asset"},
+      {"max_asset_bytes_per_principal", &limits.max_asset_bytes_per_principal, kMiB, kMostAssets,
+       "Bytes of all assets of one principal"},
+      {"max_total_asset_bytes", &limits.max_total_asset_bytes, kMiB, kMostAssets,
+       "Bytes of all assets"},
+      {"asset_ttl_s", &config.asset_ttl_s, 0, 31'536'000,
+       "Seconds after which an asset that no session names\nis deleted; 0: never"},
       {"idle_s", &config.idle_s, 0, 31'536'000,
        "Seconds after which an unused paused session\nis kept in the store alone; 0: never"},
       {"max_tests", &limits.max_tests, 1, 256, "Tests of textiles at a time"},
@@ -285,6 +293,7 @@ Config read_config(int argc, const char* const* argv) {
     if (app.count(flag_of(known_texts[i].key)) > 0) *known_texts[i].target = given_texts[i];
   config.insecure |= insecure;
   config.server.idle = std::chrono::seconds(config.idle_s);
+  config.server.asset_ttl = std::chrono::seconds(config.asset_ttl_s);
   set_tls(config, tls);
   if (config.server.metrics) check_metrics(config);
   if (config.server.data_dir->empty()) refuse("data_dir is empty; give a directory, or none");

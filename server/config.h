@@ -10,7 +10,7 @@ namespace weft {
 // What weftd was told to do.
 struct Config {
   ServerOptions server;
-  std::int64_t idle_s = 3600;
+  std::int64_t idle_s = 3600, asset_ttl_s = 86'400;
   bool insecure = false;  // may listen beyond this machine, without encryption
   std::string log_level = "info";
 };

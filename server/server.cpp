@@ -2,6 +2,7 @@
 
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <array>
@@ -10,6 +11,8 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "server/rpc/asset_service.h"
+#include "server/rpc/assets.h"
 #include "server/rpc/backend.h"
 #include "server/rpc/find.h"
 #include "server/rpc/frame_service.h"
@@ -24,6 +27,7 @@ namespace weft {
 namespace {
 
 constexpr std::array kServices = {"",
+                                  "weft.v1.AssetService",
                                   "weft.v1.SessionService",
                                   "weft.v1.FrameService",
                                   "weft.v1.ServerService",
@@ -72,14 +76,21 @@ std::unique_ptr<SessionStore> open_store(const ServerOptions& options) {
 }
 
 // Until it is told to stop.
-void evict(const std::stop_token& stop, Backend& backend, std::chrono::milliseconds idle) {
+void repeat(const std::stop_token& stop, std::chrono::milliseconds period,
+            const std::function<void()>& work) {
   std::mutex mutex;
   std::condition_variable_any never;
   std::unique_lock lock(mutex);
   while (!stop.stop_requested()) {
-    never.wait_for(lock, stop, idle / 8, [] { return false; });
-    if (!stop.stop_requested()) evict_sessions(backend, idle);
+    never.wait_for(lock, stop, period, [] { return false; });
+    if (!stop.stop_requested()) work();
   }
+}
+
+void sweep(Backend& backend, std::chrono::milliseconds ttl) try {
+  sweep_assets(backend, std::chrono::system_clock::now() - ttl);
+} catch (const StoreError& error) {
+  spdlog::warn("assets that nothing uses stay: {}", error.what());
 }
 
 }  // namespace
@@ -89,9 +100,11 @@ struct Server::Parts {
       : backend(options.limits, options.worker_threads,
                 std::chrono::milliseconds(options.snapshot_ms), open_store(options),
                 options.database ? replica_of(options) : "",
-                Access(options.tokens, options.tls && options.tls->client_ca)) {}
+                Access(options.tokens, options.tls && options.tls->client_ca)),
+        assets(backend, options.upload_patience) {}
 
   Backend backend;
+  AssetService assets;
   SessionService sessions{backend};
   FrameService frames{backend};
   ServerService server{backend};
@@ -99,7 +112,7 @@ struct Server::Parts {
   LabService lab{backend};
   std::unique_ptr<grpc::Server> grpc;
   std::optional<Metrics> metrics;
-  std::jthread eviction;
+  std::jthread eviction, sweeping;
   bool stopped = false;
 };
 
@@ -108,6 +121,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
   enable_plugins();
   grpc::ServerBuilder builder;
   set_transport(builder, options.limits);
+  builder.RegisterService(&parts_->assets);
   builder.RegisterService(&parts_->sessions);
   builder.RegisterService(&parts_->frames);
   builder.RegisterService(&parts_->server);
@@ -132,7 +146,13 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
        },
        [backend = &parts_->backend](const std::string& id) { adopt_session(*backend, id); }});
   if (options.idle.count() > 0 && (options.database || options.data_dir))
-    parts_->eviction = std::jthread(evict, std::ref(parts_->backend), options.idle);
+    parts_->eviction = std::jthread(
+        repeat, options.idle / 8,
+        [backend = &parts_->backend, idle = options.idle] { evict_sessions(*backend, idle); });
+  if (options.asset_ttl.count() > 0)
+    parts_->sweeping = std::jthread(
+        repeat, options.asset_ttl / 8,
+        [backend = &parts_->backend, ttl = options.asset_ttl] { sweep(*backend, ttl); });
   for (const char* service : kServices) {
     parts_->grpc->GetHealthCheckService()->SetServingStatus(service, true);
   }
@@ -144,6 +164,7 @@ Server::~Server() {
   parts_->backend.planner.stop();
   parts_->backend.large_planner.stop();
   parts_->backend.store_calls.stop();
+  parts_->backend.asset_calls.stop();
   parts_->backend.scheduler.stop();  // and sessions the store
 }
 
@@ -171,15 +192,18 @@ void Server::stop(std::chrono::milliseconds deadline) {
   parts_->grpc->GetHealthCheckService()->Shutdown();  // NOT_SERVING
   parts_->backend.draining = true;
   parts_->eviction.request_stop();
+  parts_->sweeping.request_stop();
 
   // end every call ourselves, and let the answers leave: gRPC would wait for ever, or drop them
   const auto end = Clock::now() + deadline;
   parts_->frames.drain();
+  parts_->assets.drain();
   parts_->backend.registry.close(Refusal::Why::kDraining);
   parts_->sessions.drain();
   parts_->backend.planner.drain();
   parts_->backend.large_planner.drain();
   parts_->backend.store_calls.drain();
+  parts_->backend.asset_calls.drain();
   parts_->lab.drain();
   const bool ended = parts_->backend.calls.wait_for_none(end);
   parts_->grpc->Shutdown(std::chrono::system_clock::now() + (ended ? kGrace : kNoGrace));

@@ -25,6 +25,9 @@ struct ServerOptions {
   std::optional<std::string> tokens;    // file of Access; absent: nobody needs one
   int snapshot_ms = 2000;               // SessionHost::snapshot_after
   std::chrono::milliseconds idle = std::chrono::hours(1);  // evict_sessions(); 0: never
+  // Assets that no session names are deleted after so long; 0: never.
+  std::chrono::milliseconds asset_ttl = std::chrono::hours(24);
+  std::chrono::milliseconds upload_patience = std::chrono::minutes(1);  // without a message
   Limits limits;
 };
 

@@ -79,7 +79,7 @@ double spring_energy(const Mesh& mesh, const Matrix3Xd& x) {
   return energy;
 }
 
-double largest_strain(const Mesh& mesh, const Matrix3Xd& x) {
+double largest_spring_strain(const Mesh& mesh, const Matrix3Xd& x) {
   double strain = 0;
   for (const Family& family : mesh.families) {
     if (family.kind != FamilyKind::kStretch) continue;

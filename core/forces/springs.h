@@ -13,7 +13,7 @@ void add_spring_forces(const Mesh& mesh, const Matrix3Xd& x, const Matrix3Xd& v,
 double spring_energy(const Mesh& mesh, const Matrix3Xd& x);
 
 // Largest (l - L) / L of the stretch connections, 0 where none is stretched.
-double largest_strain(const Mesh& mesh, const Matrix3Xd& x);
+double largest_spring_strain(const Mesh& mesh, const Matrix3Xd& x);
 
 // Adds the forces of the isometric bending law (Bergou et al. 2006).
 void add_isometric_forces(const Mesh& mesh, const Matrix3Xd& x, Matrix3Xd& force);

@@ -6,7 +6,7 @@
 #include <optional>
 #include <variant>
 
-#include "core/forces/springs.h"
+#include "core/forces/elastic.h"
 
 namespace weft {
 namespace {
@@ -24,15 +24,14 @@ class Statics {
   int unknowns() const { return 3 * free_; }
 
   double energy(const Matrix3Xd& x) const {
-    return spring_energy(mesh_, x) + isometric_energy(mesh_, x) -
+    return elastic_energy(mesh_, x) -
            mesh_.mass.dot(x.transpose() * gravity_);
   }
 
   // Net forces on the free particles.
   VectorXd force(const Matrix3Xd& x) const {
     Matrix3Xd all = gravity_ * mesh_.mass.transpose();
-    add_spring_forces(mesh_, x, Matrix3Xd::Zero(3, x.cols()), all);
-    add_isometric_forces(mesh_, x, all);
+    add_elastic_forces(mesh_, x, Matrix3Xd::Zero(3, x.cols()), all);
     VectorXd out(unknowns());
     for (Eigen::Index i = 0; i < x.cols(); ++i)
       if (place_[i] >= 0) out.segment<3>(place_[i]) = all.col(i);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/forces/springs.h"
+#include "core/forces/elastic.h"
 #include "core/lab/drape.h"
 #include "core/lab/elastica.h"
 #include "core/lab/specimen.h"
@@ -22,8 +22,7 @@ int steps_of(double length, double spacing) {
 
 Matrix3Xd forces(const Mesh& mesh, const Matrix3Xd& x) {
   Matrix3Xd force = Matrix3Xd::Zero(3, x.cols());
-  add_spring_forces(mesh, x, Matrix3Xd::Zero(3, x.cols()), force);
-  add_isometric_forces(mesh, x, force);
+  add_elastic_forces(mesh, x, Matrix3Xd::Zero(3, x.cols()), force);
   return force;
 }
 
@@ -92,7 +91,7 @@ LabReport shear(const LabOrder& order, const LabWatch& watch) {
     Matrix3Xd x = specimen.start;
     x.row(0) += std::sin(kAngle) * specimen.start.row(2);
     x.row(2) *= std::cos(kAngle);
-    const double energy = spring_energy(specimen.mesh, x) + isometric_energy(specimen.mesh, x);
+    const double energy = elastic_energy(specimen.mesh, x);
     const double area = std::pow((side - 1) * spacing, 2);
     report.values.push_back(value("shear stiffness", "N/m per radian", specimen, textile.shear,
                                   2 * energy / (area * kAngle * kAngle)));

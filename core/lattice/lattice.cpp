@@ -162,12 +162,7 @@ Mesh make_lattice(const SheetDefinition& sheet) {
     return idle || family.connections.empty();
   });
 
-  const Connections cells = connections(grid, 1, 1);
-  mesh.triangles.reserve(2 * cells.size());
-  for (const auto& [i, j] : cells) {
-    mesh.triangles.push_back({i, j - 1, i + 1});
-    mesh.triangles.push_back({j, i + 1, j - 1});
-  }
+  mesh.triangles = triangles_of(grid);
   return mesh;
 }
 

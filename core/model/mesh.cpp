@@ -26,7 +26,7 @@ StartPositions::StartPositions(const SheetDefinition& sheet)
 Vector3d StartPositions::operator()(int particle) const {
   if (!sheet_.start_positions.empty())
     return Eigen::Map<const Vector3d>(sheet_.start_positions.data() + 3 * std::ptrdiff_t{particle});
-  return sheet_.origin + rotation_ * flat_position(sheet_.shape, particle);
+  return sheet_.origin + rotation_ * local_position(sheet_.shape, particle);
 }
 
 Matrix3Xd start_positions(const SheetDefinition& sheet) {

@@ -56,7 +56,13 @@ class Connections {
   std::size_t size_ = 0;
 };
 
-enum class FamilyKind { kStretch, kShear, kBend, kDiagonalBend };
+enum class FamilyKind {
+  kStretch,
+  kShear,
+  kBend,
+  kDiagonalBend,
+  kDamp  // edges of triangles, which only damp
+};
 
 // Connections that share a law and its constants.
 struct Family {
@@ -75,6 +81,45 @@ struct Stencil {
   double stiffness;  // N/m
 };
 
+// A triangle, with the gradients of its corners' hat functions along warp and weft.
+struct MembraneElement {
+  std::array<int, 3> particle{};
+  std::array<double, 3> du{}, dv{};  // 1/m
+  double area = 0;                   // of the flat shape, m^2
+  int panel = 0;
+};
+
+// Second derivatives of positions along warp and weft at a particle, x_uu, x_uv and x_vv: sums of
+// the positions around it by these weights, 1/m^2.
+struct CurvatureFit {
+  std::vector<int> particle;                  // the first is its own
+  std::vector<std::array<double, 3>> weight;  // uu, uv, vv
+  double area = 0;                            // of it that has this panel's textile, m^2
+  int panel = 0;
+};
+
+// Stiffness of a panel in its plane, N/m.
+struct MembraneStiffness {
+  double warp = 0, weft = 0;
+  double coupling = 0;  // of strain along the warp with that along the weft
+  double shear = 0;     // per radian
+};
+
+// Bending rigidity of a panel, N m. Twist: the mean of warp and weft in a textile without cross
+// contraction.
+struct BendStiffness {
+  double warp = 0, weft = 0, twist = 0;
+};
+
+// What a sheet of triangles resists strain and curvature by; empty: it does not.
+struct Surface {
+  std::vector<MembraneElement> membrane = {};
+  std::vector<CurvatureFit> fits = {};
+  std::vector<MembraneStiffness> stretch = {};  // of each panel
+  std::vector<BendStiffness> bend = {};         // of each panel
+  bool pushes = true;  // where it is shortened, as it pulls; needs no coupling
+};
+
 // Particles and connections: all that forces know of a sheet.
 struct Mesh {
   VectorXd mass;       // (particles) kg
@@ -82,7 +127,8 @@ struct Mesh {
   double damping = 0;  // k_d of every connection, kg/s
   std::vector<Family> families;
   std::vector<Stencil> stencils;
-  std::vector<std::array<int, 3>> triangles;
+  Surface surface;
+  std::vector<std::array<int, 3>> triangles;  // that wind presses on
 };
 
 // Whether stretch connections push.

@@ -24,6 +24,20 @@ void set_normals(const Grid& sheet, const ConstPlanes& x, Eigen::Index first, Pl
   }
 }
 
+// Weighted by area, as cross products are.
+void set_normals(const Triangles& sheet, const ConstPlanes& x, Eigen::Index first,
+                 Planes& normals) {
+  const auto particles = static_cast<Eigen::Index>(sheet->start.size());
+  normals.middleRows(first, particles).setZero();
+  for (const auto& [a, b, c] : sheet->triangles) {
+    const Eigen::Vector3d along = x.row(first + b) - x.row(first + a);
+    const Eigen::Vector3d across = x.row(first + c) - x.row(first + a);
+    const Eigen::RowVector3d normal = along.cross(across);
+    for (const int i : {a, b, c}) normals.row(first + i) += normal;
+  }
+  for (Eigen::Index i = first; i < first + particles; ++i) normals.row(i).normalize();
+}
+
 }  // namespace
 
 std::vector<double> normals_of(const std::vector<double>& positions,

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "core/model/actions.h"
+#include "core/model/mesh_problems.h"
 #include "core/model/scene.h"
 
 namespace weft {
@@ -147,10 +148,38 @@ bool check_shape(const Grid& grid, const std::string& sheet, Check& check) {
   return sized;
 }
 
+bool check_shape(const Triangles& mesh, const std::string& sheet, Check& check) {
+  bool sound = true;
+  for (const Problem& each : find_problems(*mesh, sheet + ".triangles.data")) {
+    check.problem(each.field, each.message);
+    sound = false;
+  }
+  return sound;
+}
+
+// Triangles resist as measured; one constant for every connection says nothing of them.
+void check_triangles(const SheetDefinition& sheet, const std::string& field, Check& check) {
+  const auto needs_measured = [&](const Textile& textile, const std::string& path) {
+    check_textile(textile, path, check);
+    if (std::holds_alternative<RawTextile>(textile.model))
+      check.problem(path + ".raw", "is for grids only; triangles need measured values");
+  };
+  needs_measured(sheet.textile, field + ".textile");
+  for (const PanelTextile& each : sheet.panel_textiles) {
+    const auto panel = static_cast<std::size_t>(each.panel);
+    needs_measured(each.textile, at(field + ".triangles.data.panels", panel) + ".textile");
+  }
+  if (std::holds_alternative<ChoiKo>(sheet.bending))
+    check.problem(field + ".bending.choi_ko", "is for grids only; triangles bend by isometric");
+}
+
 void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& check) {
   const bool sized =
       std::visit([&](const auto& shape) { return check_shape(shape, field, check); }, sheet.shape);
-  check_textile(sheet.textile, field + ".textile", check);
+  if (std::holds_alternative<Triangles>(sheet.shape))
+    check_triangles(sheet, field, check);
+  else
+    check_textile(sheet.textile, field + ".textile", check);
 
   if (const auto* law = std::get_if<ChoiKo>(&sheet.bending)) {
     check.number(field + ".bending.choi_ko.segments", law->segments, 1, 65536, "");

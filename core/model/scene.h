@@ -47,6 +47,12 @@ struct Isometric {
 
 using BendingLaw = std::variant<ChoiKo, Isometric>;
 
+// What a panel is made of, where that is not the sheet's textile.
+struct PanelTextile {
+  int panel = 0;
+  Textile textile;
+};
+
 struct Pin {
   std::vector<int> particles;
   Path path;
@@ -55,10 +61,12 @@ struct Pin {
 struct SheetDefinition {
   std::string name;
   SheetShape shape;
+  std::string asset;  // name of what holds the shape; empty: it has none
   Textile textile;
+  std::vector<PanelTextile> panel_textiles;
   BendingLaw bending;
-  Vector3d origin = Vector3d::Zero();              // of particle 0, m
-  Quaterniond rotation = Quaterniond::Identity();  // about particle 0
+  Vector3d origin = Vector3d::Zero();              // of the shape's coordinates, m
+  Quaterniond rotation = Quaterniond::Identity();  // about it
   std::vector<double> start_positions;             // (3 x particles) x, y, z of each, m; or empty
   std::vector<double> start_velocities;            // (3 x particles), m/s; or empty
   std::vector<Pin> pins;

@@ -32,17 +32,19 @@ SelfWeightStrain self_weight_strain(const SheetDefinition& sheet, const Environm
   return {load.warp / stretch, load.weft / stretch};
 }
 
-Textile cap_stretch(const SheetDefinition& sheet, const Environment& environment, double strain) {
+void cap_stretch(SheetDefinition& sheet, const Environment& environment, double strain) {
   const Load load = load_of(sheet, environment);
-  Textile textile = sheet.textile;
-  if (auto* measured = std::get_if<MeasuredTextile>(&textile.model)) {
-    measured->tensile_warp = std::min(measured->tensile_warp, load.warp / strain);
-    measured->tensile_weft = std::min(measured->tensile_weft, load.weft / strain);
-  } else {
-    auto& raw = std::get<RawTextile>(textile.model);
-    raw.stretch = std::min(raw.stretch, std::max(load.warp, load.weft) / strain);
-  }
-  return textile;
+  const auto cap = [&](Textile& textile) {
+    if (auto* measured = std::get_if<MeasuredTextile>(&textile.model)) {
+      measured->tensile_warp = std::min(measured->tensile_warp, load.warp / strain);
+      measured->tensile_weft = std::min(measured->tensile_weft, load.weft / strain);
+    } else {
+      auto& raw = std::get<RawTextile>(textile.model);
+      raw.stretch = std::min(raw.stretch, std::max(load.warp, load.weft) / strain);
+    }
+  };
+  cap(sheet.textile);
+  for (PanelTextile& panel : sheet.panel_textiles) cap(panel.textile);
 }
 
 }  // namespace weft

@@ -11,8 +11,8 @@ struct SelfWeightStrain {
 };
 SelfWeightStrain self_weight_strain(const SheetDefinition& sheet, const Environment& environment);
 
-// The textile with tensile stiffness no larger than this strain asks for. A clamp of bending that
-// follows the stiffness follows it here too.
-Textile cap_stretch(const SheetDefinition& sheet, const Environment& environment, double strain);
+// Gives the sheet's textiles tensile stiffness no larger than this strain asks for. A clamp of
+// bending that follows the stiffness follows it here too.
+void cap_stretch(SheetDefinition& sheet, const Environment& environment, double strain);
 
 }  // namespace weft

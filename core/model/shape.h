@@ -1,10 +1,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <string>
 #include <variant>
+#include <vector>
 
 namespace weft {
 
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 // rows x columns particles; particle (r, c) has index r * columns + c and lies at (c h, 0, r h).
@@ -14,11 +19,48 @@ struct Grid {
   double spacing = 0;  // h, m
 };
 
+// Triangles cut out of one piece.
+struct Panel {
+  std::string name;
+  int triangles = 0;  // how many
+  double grain = 0;   // from the v axis of the flat shape to the warp, rad, anticlockwise
+};
+
+// Triangles of any outline, and the flat shape that they were cut in.
+struct TriangleMesh {
+  std::vector<Vector3d> start;                // of each particle, before the sheet is placed, m
+  std::vector<std::array<int, 3>> triangles;  // particles, anticlockwise where normals point to
+  std::vector<Vector2d> flat;                 // corners of the flat shape, u and v, m
+  std::vector<std::array<int, 3>> flat_triangles;  // corners of each; empty: as `triangles`
+  std::vector<Panel> panels;                       // runs of triangles, together all
+  // These follow, see complete().
+  double spacing = 0;                // median edge of the flat shape, m
+  Vector2d size = Vector2d::Zero();  // of the largest panel along warp and weft, m
+};
+
+// Large, and never changed: shared.
+using Triangles = std::shared_ptr<const TriangleMesh>;
+
+// The mesh with what it lacks: a start from the flat shape, a flat shape from a start in the plane
+// y = 0, one panel; and with what follows. Of a faulty mesh nothing follows.
+Triangles complete(TriangleMesh mesh);
+
+// Corner k of triangle t in the flat shape, u and v, m.
+inline const Vector2d& flat_corner(const TriangleMesh& mesh, std::size_t t, std::size_t k) {
+  const auto& corners = mesh.flat_triangles.empty() ? mesh.triangles : mesh.flat_triangles;
+  return mesh.flat[static_cast<std::size_t>(corners[t][k])];
+}
+
 // What a sheet is cut as. Whoever needs to know more of it than the functions below tell belongs to
 // the folder of its kind.
-using SheetShape = std::variant<Grid>;
+using SheetShape = std::variant<Grid, Triangles>;
 
 int particle_count(const SheetShape& shape);
+
+// Particles of each triangle, to draw, to push by wind, and to measure strain; anticlockwise where
+// normals point to.
+std::vector<std::array<int, 3>> triangles_of(const SheetShape& shape);
+int triangle_count(const SheetShape& shape);
 
 // Between neighbours: the length by which a sheet's own lengths are judged, m.
 double spacing(const SheetShape& shape);
@@ -29,7 +71,7 @@ struct Extent {
 };
 Extent extent(const SheetShape& shape);
 
-// Of a particle in the flat sheet, from particle 0, m.
-Vector3d flat_position(const SheetShape& shape, int particle);
+// Of a particle before the sheet is placed, m.
+Vector3d local_position(const SheetShape& shape, int particle);
 
 }  // namespace weft

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/forces/springs.h"
+#include "core/forces/elastic.h"
 #include "core/model/text.h"
 
 namespace weft {
@@ -14,6 +14,12 @@ double work_of_motion(const Mesh& mesh, const Drive& drive, double stored) {
   for (const Family& family : mesh.families)
     if (!family.bend)
       stiffness += family.stiffness * static_cast<double>(family.connections.size());
+  for (const MembraneElement& element : mesh.surface.membrane) {
+    const MembraneStiffness& k = mesh.surface.stretch[static_cast<std::size_t>(element.panel)];
+    for (std::size_t c = 0; c < 3; ++c)
+      stiffness += element.area * ((k.warp + k.coupling + k.shear) * element.du[c] * element.du[c] +
+                                   (k.weft + k.coupling + k.shear) * element.dv[c] * element.dv[c]);
+  }
   const double way = drive.speed * drive.frame_step;
   const double root = std::sqrt(stored) + way * std::sqrt(2 * stiffness);
   return root * root - stored +
@@ -26,8 +32,7 @@ std::string audit(const Mesh& mesh, const Drive& drive, double height, double wi
   constexpr double kStoredShare = 0.05, kWeightShare = 1e-6;
   constexpr double kWindShare = 20;  // of M u^2, what a wind can bring a sheet to
   const double mass = mesh.mass.sum();
-  const double stored =
-      state.kinetic_energy + spring_energy(mesh, state.x) + isometric_energy(mesh, state.x);
+  const double stored = state.kinetic_energy + elastic_energy(mesh, state.x);
   const double energy = stored - mesh.mass.dot(state.x.transpose() * drive.gravity);
   budget.substeps = 0;
   budget.stored = std::max(budget.stored, stored);

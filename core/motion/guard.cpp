@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/forces/springs.h"
+#include "core/forces/elastic.h"
 #include "core/model/text.h"
 
 namespace weft {
@@ -15,10 +15,6 @@ bool within_reach(const Matrix3Xd& values) {
   bool within = true;
   for (const double value : values.reshaped()) within &= std::abs(value) <= kFarthest;
   return within;
-}
-
-double elastic_energy(const Mesh& mesh, const Matrix3Xd& x) {
-  return spring_energy(mesh, x) + isometric_energy(mesh, x);
 }
 
 double path_speed(const Path& path, double begin, double end) {

@@ -5,6 +5,11 @@
 #include <cmath>
 #include <limits>
 
+#include "core/forces/curvature.h"
+#include "core/forces/elastic.h"
+#include "core/forces/membrane.h"
+#include "core/motion/surface_bound.h"
+
 namespace weft {
 namespace {
 
@@ -16,6 +21,42 @@ struct Block {
   Vector3d direction;
   double along, across;
 };
+
+// Second derivatives of a triangle's energy: of its strains, and of its threads under stress.
+struct MembraneTangent {
+  const MembraneElement& element;
+  MembraneStiffness stiffness;
+  Threads threads;
+  MembraneStrain stress;
+
+  // Adds `share` of it times y to out.
+  void add(double share, const Matrix3Xd& y, Matrix3Xd& out) const {
+    const Threads moved = threads_of(element, y);
+    const MembraneStrain strain{threads.warp.dot(moved.warp), threads.weft.dot(moved.weft),
+                                threads.warp.dot(moved.weft) + threads.weft.dot(moved.warp)};
+    const MembraneStrain changed = weft::stress(stiffness, strain, true);
+    const Vector3d warp = changed.warp * threads.warp + changed.shear * threads.weft +
+                          stress.warp * moved.warp + stress.shear * moved.weft;
+    const Vector3d weft = changed.weft * threads.weft + changed.shear * threads.warp +
+                          stress.weft * moved.weft + stress.shear * moved.warp;
+    for (std::size_t k = 0; k < 3; ++k)
+      out.col(element.particle[k]) +=
+          share * element.area * (element.du[k] * warp + element.dv[k] * weft);
+  }
+};
+
+MembraneTangent tangent_of(const Surface& surface, const MembraneElement& element,
+                           const Matrix3Xd& x) {
+  MembraneTangent tangent{element,
+                          surface.stretch[static_cast<std::size_t>(element.panel)],
+                          threads_of(element, x),
+                          {}};
+  const MembraneStrain strain = strain_of(tangent.threads);
+  tangent.stress = stress(tangent.stiffness, strain, surface.pushes);
+  if (!surface.pushes && strain.warp < 0) tangent.stiffness.warp = 0;
+  if (!surface.pushes && strain.weft < 0) tangent.stiffness.weft = 0;
+  return tangent;
+}
 
 // a K + b C over vectors of (D x particles), scaled by 1/sqrt(mass) on both sides. One dimension
 // serves the graph Laplacian, three the Jacobian.
@@ -29,6 +70,8 @@ class Operator {
       : mesh_(mesh), scale_(inverse_mass.cwiseSqrt()), damping_(damping), air_rate_(air_rate) {}
 
   void add(const Block& block) { blocks_.push_back(block); }
+  // Of the membrane at a shape.
+  void add(const MembraneTangent& tangent) { tangents_.push_back(tangent); }
   void set_factors(double stiffness, double damping) { a_ = stiffness, b_ = damping; }
   Eigen::Index size() const { return scale_.size() * D; }
 
@@ -50,6 +93,10 @@ class Operator {
       sum *= a_ * stencil.stiffness;
       for (std::size_t k = 0; k < 4; ++k) out.col(stencil.particle[k]) += stencil.weight[k] * sum;
     }
+    if constexpr (D == 3)
+      for (const MembraneTangent& tangent : tangents_) tangent.add(a_, y, out);
+    if (a_ != 0)
+      for (const CurvatureFit& fit : mesh_.surface.fits) add(fit, y, out);
     for (Eigen::Index i = 0; i < scale_.size(); ++i) {
       out.col(i) *= scale_[i];
       if (scale_[i] > 0) out.col(i) += b_ * air_rate_ * given.col(i);
@@ -58,11 +105,22 @@ class Operator {
   }
 
  private:
+  void add(const CurvatureFit& fit, const Points& y, Points& out) const {
+    Eigen::Matrix<double, D, 3> sum = Eigen::Matrix<double, D, 3>::Zero();
+    const auto weight = [&](std::size_t k) { return Vector3d::Map(fit.weight[k].data()); };
+    for (std::size_t k = 0; k < fit.particle.size(); ++k)
+      sum += y.col(fit.particle[k]) * weight(k).transpose();
+    sum *= (a_ * fit_stiffness(mesh_.surface, fit)).asDiagonal();
+    for (std::size_t k = 0; k < fit.particle.size(); ++k)
+      out.col(fit.particle[k]) += sum * weight(k);
+  }
+
   const Mesh& mesh_;
   VectorXd scale_;
   double damping_, air_rate_;
   double a_ = 1, b_ = 0;
   std::vector<Block> blocks_;
+  std::vector<MembraneTangent> tangents_;
 };
 
 // Largest eigenvalue by Lanczos' method, from a fixed start, up to where it stops growing.
@@ -182,10 +240,85 @@ double eigenvalue(Operator<D>& matrix, double stiffness, double damping) {
   return largest_eigenvalue(matrix);
 }
 
+// Where the largest eigenvalues of K and C reach dt^2 K + 4 dt C = 4 M, or the limit of another
+// integrator.
+double limit(IntegratorKind kind, double stiffness, double damping) {
+  if (kind != IntegratorKind::kVerlet) return velocity_step(kind, stiffness, damping, 0);
+  if (stiffness <= 0 && damping <= 0) return kInfinity;
+  return 2 / (damping + std::sqrt(damping * damping + stiffness));
+}
+
+// What resists and damps each free particle of triangles at most, over its mass, 1/s^2 and 1/s.
+struct Rates {
+  VectorXd stiffness, damping;
+
+  int stiffest() const {
+    Eigen::Index i = 0;
+    stiffness.maxCoeff(&i);
+    return static_cast<int>(i);
+  }
+  // Of the stiffest; infinity where nothing is stiff.
+  double damping_ratio() const {
+    const int i = stiffest();
+    return stiffness[i] > 0 ? damping[i] / (2 * std::sqrt(stiffness[i])) : kInfinity;
+  }
+};
+Rates largest_rates(const Mesh& mesh, const VectorXd& inverse_mass, double damping, double strain) {
+  const SurfaceBound bound = surface_bound(mesh, strain);
+  VectorXd damped = VectorXd::Zero(mesh.mass.size());
+  for (const Family& family : mesh.families)
+    for (const auto& [i, j] : family.connections) {
+      damped[i] += 2 * damping;
+      damped[j] += 2 * damping;
+    }
+  return {(bound.membrane + bound.bend).cwiseProduct(inverse_mass),
+          damped.cwiseProduct(inverse_mass)};
+}
+
+// Of triangles. The bound is that of the particle that bears least, and holds up to a strain of
+// kBoundStrain, or up to that of the shape; the estimate takes the Jacobian at x.
+StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
+                        double air_rate, const Matrix3Xd& x) {
+  const double strain = std::max(kBoundStrain, largest_strain(mesh, x));
+  const Rates rates = largest_rates(mesh, inverse_mass, mesh.damping, strain);
+  StableStep step;
+  step.linear_bound = kInfinity;
+  double gamma = 0;
+  for (Eigen::Index i = 0; i < inverse_mass.size(); ++i) {
+    if (inverse_mass[i] == 0) continue;
+    const double damping = rates.damping[i] + air_rate;
+    const double most = limit(integrator, rates.stiffness[i], damping);
+    gamma = std::max(gamma, damping);
+    if (most >= step.linear_bound) continue;
+    step.linear_bound = most;
+    step.limiting_particle = static_cast<int>(i);
+  }
+
+  Operator<3> jacobian(mesh, inverse_mass, mesh.damping, air_rate);
+  for (const MembraneElement& element : mesh.surface.membrane)
+    jacobian.add(tangent_of(mesh.surface, element, x));
+  const double stiffness = eigenvalue(jacobian, 1, 0);
+  step.estimate = limit(integrator, stiffness, gamma);
+  // only where damping counts do both have to be seen together
+  constexpr double kCounts = 0.005;
+  if (integrator == IntegratorKind::kVerlet && step.estimate * gamma > kCounts) {
+    for (const Family& family : mesh.families)
+      for (const Connection& connection : family.connections)
+        jacobian.add(jacobian_block(family, connection, x));
+    step.estimate = verlet_step(jacobian, stiffness, eigenvalue(jacobian, 0, 1));
+  }
+  const Rates unstrained = largest_rates(mesh, inverse_mass, mesh.damping, 0);
+  step.connection_ratio = unstrained.damping_ratio();
+  step.damping_ratio = std::isinf(step.connection_ratio) ? 0 : step.connection_ratio;
+  return step;
+}
+
 }  // namespace
 
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                        double air_rate, const Matrix3Xd& x) {
+  if (!mesh.surface.membrane.empty() || !mesh.surface.fits.empty())
+    return surface_step(mesh, inverse_mass, integrator, air_rate, x);
   Operator<1> graph = graph_of(mesh, inverse_mass, mesh.damping, air_rate);
   Operator<3> jacobian(mesh, inverse_mass, mesh.damping, air_rate);
   double largest_stiffness = 0;
@@ -215,6 +348,10 @@ StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrato
 }
 
 double damping_for(const Mesh& mesh, double ratio) {
+  if (!mesh.surface.membrane.empty()) {
+    const double unit = largest_rates(mesh, mesh.mass.cwiseInverse(), 1, 0).damping_ratio();
+    return unit > 0 && unit < kInfinity ? ratio / unit : 0;
+  }
   Operator<1> graph = graph_of(mesh, mesh.mass.cwiseInverse(), 1, 0);
   const double omega2 = eigenvalue(graph, 1, 0);
   return omega2 > 0 ? ratio * 2 * std::sqrt(omega2) / eigenvalue(graph, 0, 1) : 0;

@@ -12,11 +12,13 @@ struct StableStep {
   double damping_ratio = 0;  // of the stiffest mode, 1 is critical
   // The same, of what connections damp alone; infinity where nothing is stiff.
   double connection_ratio = 0;
+  int limiting_particle = -1;  // of a sheet of triangles: the one that the bound is for
 };
 
 // With K and C the stiffness and damping matrices, Verlet with extrapolated damping is stable while
 // dt^2 K + 4 dt C < 4 M. The bound replaces K by the graph Laplacian of the largest stiffness of
-// each connection, whatever its direction; the estimate takes the Jacobian at x. air_rate: damping
+// each connection, whatever its direction, and of triangles by diagonal matrices that bound theirs
+// (surface_bound.h); the estimate takes the Jacobian at x. air_rate: damping
 // by wind, 1/s. x: (3 x n) m.
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                        double air_rate, const Matrix3Xd& x);

@@ -5,6 +5,9 @@
 #include <google/protobuf/timestamp.pb.h>
 
 #include <chrono>
+#include <functional>
+#include <memory>
+#include <set>
 #include <string>
 #include <variant>
 #include <vector>
@@ -13,6 +16,7 @@
 #include "core/simulation.h"
 #include "server/session/session.h"
 #include "weft/v1/lab.pb.h"
+#include "weft/v1/mesh.pb.h"
 #include "weft/v1/session.pb.h"
 
 // Between the words of the interface (weft::v1) and those of the solver.
@@ -22,8 +26,15 @@ namespace weft {
 template <class T>
 using Converted = std::variant<T, std::vector<Problem>>;
 
+// The mesh of an asset, by its name; nullptr where there is none.
+using FindMesh = std::function<std::shared_ptr<const v1::MeshData>(const std::string& name)>;
+
 // A scene that can be simulated. Paths in problems begin with `field`.
-Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field);
+Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field,
+                          const FindMesh& find_mesh = {});
+
+// The hashes of the assets that a scene names.
+std::set<std::string> assets_of(const Scene& scene);
 
 // A textile that can be simulated.
 Converted<Textile> to_textile(const v1::Textile& textile, const std::string& field);
@@ -42,8 +53,8 @@ enum class StartValues { kIncluded, kLeftOut };
 
 // With every default filled in.
 v1::Session to_proto(const Session& session, StartValues start_values = StartValues::kIncluded);
-// One that another server has: what never changes of it.
-v1::Session to_proto(const SessionIdentity& identity, const Scene& scene);
+// One that another server has, with the scene as it was given: what never changes of it.
+v1::Session to_proto(const SessionIdentity& identity, v1::Scene given);
 v1::Snapshot to_proto(const Session& session, const NamedSnapshot& snapshot);
 v1::Textile to_proto(const Textile& textile);
 

@@ -62,6 +62,8 @@ std::vector<std::string> names(const std::string& stem, const RepeatedPtrField<M
 // scene.
 class Reader {
  public:
+  explicit Reader(const FindMesh& find_mesh = {}) : find_mesh_(find_mesh) {}
+
   Scene scene(const v1::Scene& from);
   Textile textile(const v1::Textile& from, const std::string& field);
   LabOrder lab_order(const v1::RunTestRequest& from);
@@ -94,6 +96,9 @@ class Reader {
   Environment environment(const v1::Environment& from);
   SolverSettings solver(const v1::SolverSettings& from);
 
+  std::shared_ptr<const v1::MeshData> mesh(const v1::TriangleSheet& from, const std::string& field);
+
+  const FindMesh& find_mesh_;
   Accuracy accuracy_ = Accuracy::kStandard;
   std::vector<Problem> problems_;
   std::vector<std::string> stand_ins_;  // beginnings of paths
@@ -120,6 +125,8 @@ Scene Reader::scene(const v1::Scene& from) {
 SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
   SheetDefinition sheet;
   sheet.shape = Grid{from.grid().rows(), from.grid().columns(), from.grid().spacing_m()};
+  if (from.has_triangles() && mesh(from.triangles(), field + ".triangles"))
+    problem(field + ".triangles", "cannot be simulated yet");
   if (!from.has_grid()) missing(field + ".mesh", "grid", field + ".grid.");
   if (from.has_textile()) {
     sheet.textile = textile(from.textile(), field + ".textile");
@@ -138,6 +145,27 @@ SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
   }
   if (from.has_skin_m()) sheet.skin = from.skin_m();
   return sheet;
+}
+
+// nullptr where there is none, which is said.
+std::shared_ptr<const v1::MeshData> Reader::mesh(const v1::TriangleSheet& from,
+                                                 const std::string& field) {
+  switch (from.source_case()) {
+    case v1::TriangleSheet::kData:
+      return {std::shared_ptr<const void>(), &from.data()};  // the scene's own, which stays
+    case v1::TriangleSheet::kAsset: {
+      auto found = find_mesh_ ? find_mesh_(from.asset()) : nullptr;
+      if (!found)
+        problem(
+            field + ".asset",
+            "\"" + from.asset() + "\" is no asset of yours that is whole; UploadAsset makes one");
+      return found;
+    }
+    case v1::TriangleSheet::SOURCE_NOT_SET:
+      problem(field + ".source", "is absent; give data or asset");
+      return nullptr;
+  }
+  return nullptr;
 }
 
 BendingLaw Reader::bending(const v1::BendingLaw& from, const std::string& field) {
@@ -353,8 +381,9 @@ Pin to_pin(const v1::Pin& pin) {
   return {{pin.particles().begin(), pin.particles().end()}, to_path(pin.path())};
 }
 
-Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field) {
-  Reader reader;
+Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field,
+                          const FindMesh& find_mesh) {
+  Reader reader(find_mesh);
   Scene read = reader.scene(scene);
   auto problems = std::move(reader).with(find_problems(read));
   if (problems.empty()) return read;

@@ -6,7 +6,8 @@
 namespace weft {
 namespace {
 
-constexpr std::string_view kCollection = "sessions/", kSnapshots = "/snapshots/";
+constexpr std::string_view kCollection = "sessions/", kSnapshots = "/snapshots/",
+                           kAssets = "assets/";
 
 }  // namespace
 
@@ -33,6 +34,17 @@ std::optional<SnapshotName> read_snapshot_name(const std::string& name) {
   SnapshotName parts{name.substr(0, at), name.substr(at + kSnapshots.size())};
   if (!is_session_id(id_of(parts.session)) || !is_session_id(parts.id)) return std::nullopt;
   return parts;
+}
+
+std::string asset_name(const std::string& hash) { return std::string(kAssets) + hash; }
+
+std::string hash_of(const std::string& name) {
+  constexpr std::size_t kDigits = 64;
+  if (!name.starts_with(kAssets)) return {};
+  std::string hash = name.substr(kAssets.size());
+  const bool sound =
+      hash.size() == kDigits && hash.find_first_not_of("0123456789abcdef") == std::string::npos;
+  return sound ? hash : std::string();
 }
 
 std::string make_session_id() {

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-// Resource names: "sessions/{session}", "sessions/{session}/snapshots/{snapshot}".
+// Resource names: "sessions/{session}", "sessions/{session}/snapshots/{snapshot}", "assets/{hash}".
 namespace weft {
 
 std::string session_name(const std::string& id);
@@ -23,6 +23,11 @@ struct SnapshotName {
 };
 // nullopt where the name is none.
 std::optional<SnapshotName> read_snapshot_name(const std::string& name);
+
+std::string asset_name(const std::string& hash);
+
+// The hash in such a name, 64 hexadecimal digits in small letters; empty where it is none.
+std::string hash_of(const std::string& name);
 
 // An id that nobody will guess to be taken.
 std::string make_session_id();

@@ -175,6 +175,13 @@ google::protobuf::Timestamp timestamp_of(std::chrono::system_clock::time_point t
       std::chrono::duration_cast<std::chrono::nanoseconds>(time.time_since_epoch()).count());
 }
 
+std::set<std::string> assets_of(const Scene& scene) {
+  std::set<std::string> hashes;
+  for (const auto& sheet : scene.sheets)
+    if (!sheet.asset.empty()) hashes.insert(hash_of(sheet.asset));
+  return hashes;
+}
+
 namespace {
 
 v1::Session session_of(const SessionIdentity& identity) {
@@ -189,9 +196,16 @@ v1::Session session_of(const SessionIdentity& identity) {
 
 }  // namespace
 
-v1::Session to_proto(const SessionIdentity& identity, const Scene& scene) {
+v1::Session to_proto(const SessionIdentity& identity, v1::Scene given) {
   v1::Session result = session_of(identity);
-  set(result.mutable_scene(), scene, textiles_of(scene), StartValues::kLeftOut);
+  for (v1::Sheet& sheet : *given.mutable_sheets()) {
+    sheet.clear_start_positions_m();
+    sheet.clear_start_velocities_m_per_s();
+    v1::Textile& textile = *sheet.mutable_textile();
+    if (textile.has_raw() && !textile.raw().has_clamp_n_per_m())
+      textile.mutable_raw()->set_clamp_n_per_m(textile.raw().stretch_n_per_m());
+  }
+  *result.mutable_scene() = std::move(given);
   return result;
 }
 

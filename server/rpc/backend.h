@@ -17,6 +17,7 @@
 #include "server/session/limits.h"
 #include "server/session/registry.h"
 #include "server/session/scheduler.h"
+#include "server/store/assets.h"
 #include "server/store/store.h"
 
 namespace weft {
@@ -72,6 +73,7 @@ struct Backend {
   SlowCalls planner{"creations", "too many sessions are being created"};
   SlowCalls large_planner{"creations", "too many large sessions are being created"};
   SlowCalls store_calls{"store_calls", "too many calls wait for the store"};
+  SlowCalls asset_calls{"asset_calls", "too many calls wait for assets"};
   std::mutex claiming;
   const std::unique_ptr<SessionStore> store;
   const std::string replica;  // among servers that share the store; else empty

@@ -5,6 +5,7 @@
 #include "server/convert/convert.h"
 #include "server/convert/names.h"
 #include "server/convert/numerics.h"
+#include "server/rpc/assets.h"
 #include "server/rpc/checks.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/find.h"
@@ -156,11 +157,15 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
   }
 
   // everything that is wrong with the scene, and its size, before anything is made of it
-  auto converted = to_scene(request.session().scene(), "session.scene");
+  const auto mesh = [&](const std::string& asset) {
+    return find_mesh(backend_.store->assets(), caller, asset);
+  };
+  auto converted = to_scene(request.session().scene(), "session.scene", mesh);
   if (const auto* problems = std::get_if<std::vector<Problem>>(&converted)) {
     return errors::field_invalid(*problems);
   }
   Scene& scene = std::get<Scene>(converted);
+  const auto fresh = name_meshes(request.session().scene(), scene);
   const std::int64_t particles = particles_of(request.session().scene());
   if (particles > backend_.limits.max_particles_per_session) {
     return errors::exhausted("particles_per_session",
@@ -184,6 +189,8 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
     response.clear_owner();
     return grpc::Status::OK;
   }
+  if (auto status = keep_assets(backend_, caller.principal, session->scene(), fresh); !status.ok())
+    return status;
   return keep(session, caller, name, nullptr);
 }
 
@@ -251,6 +258,8 @@ grpc::Status SessionService::restore(const Caller& caller, const v1::RestoreSess
   }
 
   const auto session = make_session(id, caller, Simulation(source.scene()), saved.first);
+  if (auto status = keep_assets(backend_, caller.principal, session->scene(), {}); !status.ok())
+    return status;
   const SessionSnapshot beginning = snapshot;
   if (!session->restore(std::move(saved)))
     return errors::snapshot_damaged(request.name(), "it does not fit the scene of its session");

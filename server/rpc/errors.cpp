@@ -196,6 +196,53 @@ grpc::Status textile_not_found(const std::string& name) {
   return to_grpc(status);
 }
 
+grpc::Status asset_not_found(const std::string& name) {
+  auto status =
+      make(grpc::StatusCode::NOT_FOUND, "ASSET_NOT_FOUND",
+           "there is no asset " + name + "; UploadAsset makes one, ListAssets names them all");
+  add_resource(status, "Asset", name);
+  return to_grpc(status);
+}
+
+grpc::Status asset_damaged(const std::string& name, const std::string& why) {
+  auto status = make(grpc::StatusCode::DATA_LOSS, "ASSET_DAMAGED", name + " is damaged: " + why);
+  add_resource(status, "Asset", name);
+  return to_grpc(status);
+}
+
+grpc::Status asset_used(const std::string& name) {
+  return failed_precondition("ASSET_USED", "a session names " + name + "; delete that first");
+}
+
+grpc::Status asset_incomplete(const std::string& name, std::int64_t received) {
+  const std::string bytes = std::to_string(received);
+  return failed_precondition("ASSET_INCOMPLETE",
+                             "of " + name + " there are only " + bytes + " bytes yet",
+                             {{"received_bytes", bytes}});
+}
+
+grpc::Status hash_differs(const std::string& name, const std::string& hash) {
+  auto status = make(grpc::StatusCode::DATA_LOSS, "HASH_DIFFERS",
+                     "the bytes that came for " + name + " have the SHA-256 " + hash +
+                         "; they are forgotten, send them again from the first",
+                     {{"hash", hash}});
+  add_resource(status, "Asset", name);
+  return to_grpc(status);
+}
+
+grpc::Status offset_stale(std::int64_t received) {
+  const std::string bytes = std::to_string(received);
+  return aborted("OFFSET_STALE", "offset is not the next byte that the server wants, " + bytes,
+                 {{"received_bytes", bytes}});
+}
+
+grpc::Status upload_stalled(std::int64_t received) {
+  const std::string bytes = std::to_string(received);
+  return to_grpc(make(grpc::StatusCode::DEADLINE_EXCEEDED, "UPLOAD_STALLED",
+                      "no message came for long; go on at byte " + bytes,
+                      {{"received_bytes", bytes}}));
+}
+
 grpc::Status failed_precondition(const std::string& reason, const std::string& message,
                                  const Metadata& metadata) {
   return to_grpc(make(grpc::StatusCode::FAILED_PRECONDITION, reason, message, metadata));
@@ -278,7 +325,7 @@ grpc::Status store_unwritable(const std::string& why) {
 
 grpc::Status store_unreachable(const std::string& why) {
   auto status = make(grpc::StatusCode::UNAVAILABLE, "STORE_UNREACHABLE",
-                     "the server cannot look for the session now: " + why);
+                     "the server cannot look it up now: " + why);
   add_retry(status);
   return to_grpc(status);
 }

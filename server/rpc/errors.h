@@ -40,6 +40,15 @@ grpc::Status snapshot_not_found(const std::string& name);
 grpc::Status snapshot_exists(const std::string& name);
 grpc::Status snapshot_damaged(const std::string& name, const std::string& why);
 grpc::Status textile_not_found(const std::string& name);
+grpc::Status asset_not_found(const std::string& name);
+grpc::Status asset_damaged(const std::string& name, const std::string& why);
+grpc::Status asset_used(const std::string& name);
+grpc::Status asset_incomplete(const std::string& name, std::int64_t received);
+// Bytes that came are not those that the asset's name says.
+grpc::Status hash_differs(const std::string& name, const std::string& hash);
+// The next bytes to send are others than those that came.
+grpc::Status offset_stale(std::int64_t received);
+grpc::Status upload_stalled(std::int64_t received);
 
 grpc::Status failed_precondition(const std::string& reason, const std::string& message,
                                  const Metadata& metadata = {});

@@ -89,6 +89,13 @@ struct Metrics::Exposed : prometheus::Collectable {
                 "Sessions that came from another server or the store", stats.sessions_taken_over()),
         counter("weft_sessions_given_away_total",
                 "Sessions that went to another server or the store", stats.sessions_given_away()),
+        gauge("weft_assets", "Assets in the store", static_cast<double>(stats.assets())),
+        gauge("weft_asset_bytes", "Bytes of all assets in the store",
+              static_cast<double>(stats.asset_bytes())),
+        counter("weft_asset_bytes_received_total", "Bytes of assets that came on streams",
+                stats.asset_bytes_received()),
+        counter("weft_asset_bytes_sent_total", "Bytes of assets sent on streams",
+                stats.asset_bytes_sent()),
         histogram("weft_frame_time_seconds", "Time to compute a frame", stats.frame_time_s()),
         histogram("weft_lateness_seconds", "How late frames of paced sessions were",
                   stats.lateness_s())};

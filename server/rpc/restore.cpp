@@ -9,6 +9,7 @@
 
 #include "server/convert/names.h"
 #include "server/convert/numerics.h"
+#include "server/rpc/assets.h"
 #include "server/rpc/server_service.h"
 
 namespace weft {
@@ -49,6 +50,7 @@ void restore_session(Backend& backend, LeftSession left) {
 
 void restore_sessions(Backend& backend) {
   LeftBehind left = backend.store->load();
+  count_assets(backend);
   for (const auto& [request, uid] : left.requests) backend.requests.remember(request, uid);
   for (const auto& damaged : left.damaged) add_damaged(backend, damaged);
 

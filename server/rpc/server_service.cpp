@@ -28,6 +28,9 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
   limits->set_max_frame_bytes(backend_.limits.max_frame_bytes);
   limits->set_max_snapshots_per_session(backend_.limits.max_snapshots_per_session);
   limits->set_max_frame_work(backend_.limits.max_frame_work);
+  limits->set_max_asset_bytes(backend_.limits.max_asset_bytes);
+  limits->set_max_asset_bytes_per_principal(backend_.limits.max_asset_bytes_per_principal);
+  limits->set_max_total_asset_bytes(backend_.limits.max_total_asset_bytes);
   limits->set_max_tests(backend_.limits.max_tests);
   limits->set_max_total_particles(backend_.limits.max_total_particles);
   limits->set_max_sessions_per_principal(backend_.limits.max_sessions_per_principal);

@@ -49,6 +49,10 @@ v1::ServerStats server_stats(const Backend& backend) {
   result.set_slow_readers(stats.slow_readers);
   result.set_sessions_taken_over(stats.taken_over);
   result.set_sessions_given_away(stats.given_away);
+  result.set_assets(stats.assets);
+  result.set_asset_bytes(stats.asset_bytes);
+  result.set_asset_bytes_received(stats.asset_bytes_received);
+  result.set_asset_bytes_sent(stats.asset_bytes_sent);
   set(result.mutable_frame_time_s(), stats.frame_time);
   set(result.mutable_lateness_s(), stats.lateness);
   return result;

@@ -206,10 +206,10 @@ v1::ListSessionsResponse SessionService::list_all(const Caller& caller,
       backend_.store->list(request.page_token(), size + 1,
                            caller.is_admin ? std::nullopt : std::optional(caller.principal));
   v1::ListSessionsResponse response;
-  for (const auto& [kept, replica] : sessions) {
-    const auto here = backend_.registry.find(kept.identity.id);
+  for (const auto& [identity, scene, replica] : sessions) {
+    const auto here = backend_.registry.find(identity.id);
     v1::Session* session = response.add_sessions();
-    *session = here ? to_proto(*here, StartValues::kLeftOut) : to_proto(kept.identity, kept.scene);
+    *session = here ? to_proto(*here, StartValues::kLeftOut) : to_proto(identity, scene);
     session->set_replica(replica);
     if (!here && replica.empty()) session->set_state(v1::SESSION_STATE_STORED);
   }

@@ -19,6 +19,9 @@ struct Limits {
   std::int64_t max_tests = 8;                   // that run or wait
   std::int64_t max_request_bytes = 16 << 20;
   std::int64_t max_frame_bytes = 4 << 20;  // gRPC's default receive limit
+  std::int64_t max_asset_bytes = 128 << 20;
+  std::int64_t max_asset_bytes_per_principal = std::int64_t{1} << 30;
+  std::int64_t max_total_asset_bytes = std::int64_t{16} << 30;
 };
 
 }  // namespace weft

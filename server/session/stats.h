@@ -46,6 +46,11 @@ struct Stats {
   Count frames_sent = 0;
   Count bytes_sent = 0;    // of frame messages
   Count slow_readers = 0;  // streams that ended because their frame was no longer kept
+
+  Count assets = 0;       // kept, as far as was seen last
+  Count asset_bytes = 0;  // of them, those still to come included
+  Count asset_bytes_received = 0;
+  Count asset_bytes_sent = 0;
 };
 
 }  // namespace weft

@@ -2,8 +2,11 @@
 #include <mutex>
 #include <utility>
 
+#include "server/convert/convert.h"
 #include "server/convert/numerics.h"
+#include "server/store/assets.h"
 #include "server/store/records.h"
+#include "server/store/sqlite_tables.h"
 #include "server/store/store.h"
 
 namespace weft {
@@ -13,8 +16,10 @@ namespace {
 class NoStore final : public SessionStore {
  public:
   LeftBehind load() override { return {}; }
-  void add(const KeptSession& /*session*/, const Request& /*creation*/,
-           const SessionSnapshot* /*beginning*/) override {}
+  void add(const KeptSession& session, const Request& /*creation*/,
+           const SessionSnapshot* /*beginning*/) override {
+    assets_.use(session.identity.uid, session.identity.owner, assets_of(session.scene));
+  }
   SessionSnapshot named_snapshot(const std::string& uid, const std::string& id) override {
     std::lock_guard lock(mutex_);
     const auto found = snapshots_.find({uid, id});
@@ -28,10 +33,12 @@ class NoStore final : public SessionStore {
   std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t /*entries*/) override {
     return std::make_unique<Log>(*this, uid);
   }
-  void erase(const std::string& /*uid*/, const Request& /*deletion*/,
+  void erase(const std::string& uid, const Request& /*deletion*/,
              const SessionLog::Written& written) override {
+    assets_.release(uid, std::chrono::system_clock::now());
     written({});
   }
+  Assets& assets() override { return assets_; }
 
  private:
   class Log final : public NoLog {
@@ -62,6 +69,7 @@ class NoStore final : public SessionStore {
     const std::string uid_;
   };
 
+  Assets assets_{open_sqlite_tables(":memory:")};
   std::mutex mutex_;
   // by the session's uid and the id
   std::map<std::pair<std::string, std::string>, std::shared_ptr<const SessionSnapshot>> snapshots_;

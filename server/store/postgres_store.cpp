@@ -11,7 +11,10 @@
 #include <thread>
 #include <utility>
 
+#include "server/convert/convert.h"
+#include "server/store/assets.h"
 #include "server/store/postgres_connection.h"
+#include "server/store/postgres_statements.h"
 #include "server/store/postgres_tables.h"
 #include "server/store/postgres_values.h"
 #include "server/store/records.h"
@@ -48,6 +51,7 @@ class PostgresStore final : public SessionStore {
         log_(url, kLogStatements),
         calls_(url),
         lease_(url),
+        assets_(std::make_unique<PostgresTables>(url)),
         snapshots_(std::make_unique<SnapshotTable>(url, tenures_)) {}
   ~PostgresStore() override { stop(); }
 
@@ -64,6 +68,7 @@ class PostgresStore final : public SessionStore {
   std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t entries) override;
   void erase(const std::string& uid, const Request& deletion,
              const SessionLog::Written& written) override;
+  Assets& assets() override { return assets_; }
 
   bool is_shared() const override { return true; }
   bool has_others() const override { return true; }
@@ -86,8 +91,8 @@ class PostgresStore final : public SessionStore {
   };
 
   static void keep_request(pqxx::work& transaction, const Request& request, const std::string& uid);
-  static LeftSession read_session(pqxx::work& transaction, const std::string& uid,
-                                  const std::string& id, const records::Row& progress);
+  LeftSession read_session(pqxx::work& transaction, const std::string& uid, const std::string& id,
+                           const records::Row& progress);
   void post(const std::string& uid, Work work, SessionLog::Written written) {
     writes_.post({uid, std::move(work), std::move(written)});
   }
@@ -106,6 +111,7 @@ class PostgresStore final : public SessionStore {
   std::int64_t number_ = 0;  // of this process among all replicas
   Tenures tenures_;
   PostgresConnection log_, calls_, lease_;
+  Assets assets_;
   std::mutex losing_;
   std::mutex mutex_;
   Watch watch_;  // guarded by mutex_
@@ -172,6 +178,8 @@ void PostgresStore::add(const KeptSession& session, const Request& creation,
     if (row[0].as<std::string>() != uid) throw SessionExists(row[1].as<std::string>());
     transaction.exec_params("INSERT INTO weft.scene VALUES ($1, $2, $3) ON CONFLICT DO NOTHING",
                             uid, binary(record), static_cast<std::int64_t>(checksum(uid, record)));
+    PostgresStatements statements(transaction);
+    Assets::use(statements, uid, session.identity.owner, assets_of(session.scene));
   });
   tenures_.set(uid, {number_, 1});
   if (beginning == nullptr) return;
@@ -189,6 +197,13 @@ void PostgresStore::erase(const std::string& uid, const Request& deletion,
   post(
       uid,
       [uid, deletion, tenure](pqxx::work& transaction) {
+        const auto own = transaction.exec_params(
+            "SELECT FROM weft.session WHERE uid = $1 AND owner = $2 AND epoch = $3", uid,
+            tenure.owner, tenure.epoch);
+        if (!own.empty()) {
+          PostgresStatements statements(transaction);
+          Assets::release(statements, uid, std::chrono::system_clock::now());
+        }
         transaction.exec_params(
             "DELETE FROM weft.session WHERE uid = $1 AND owner = $2 AND epoch = $3", uid,
             tenure.owner, tenure.epoch);
@@ -321,7 +336,7 @@ LeftSession PostgresStore::read_session(pqxx::work& transaction, const std::stri
     entries.push_back({{bytes_of(row[1]), number_of(row[2])}, number_of(row[0])});
   }
   return records::assemble(uid, id, {bytes_of(scene[0][0]), number_of(scene[0][1])}, progress,
-                           entries);
+                           entries, assets_);
 }
 
 Claim PostgresStore::claim(const std::string& id) {
@@ -349,6 +364,8 @@ Claim PostgresStore::claim(const std::string& id) {
     tenure = {number_, number_of(taken[0][1])};
     try {
       claim = read_session(transaction, uid, id, {bytes_of(taken[0][2]), number_of(taken[0][3])});
+    } catch (const StoreLost&) {
+      throw;
     } catch (const StoreError& error) {
       claim = DamagedSession{id, uid, error.what(), taken[0][4].as<std::string>()};
     }
@@ -383,8 +400,11 @@ std::vector<ListedSession> PostgresStore::list(const std::string& after, std::si
              "WHERE s.id COLLATE \"C\" > $1 AND ($2 OR s.principal = $3) "
              "ORDER BY s.id COLLATE \"C\" LIMIT $4",
              after, !owner, owner.value_or(""), static_cast<std::int64_t>(count))) {
-      auto session = records::kept(row[2].as<std::string>(), {bytes_of(row[0]), number_of(row[1])});
-      if (session) sessions.push_back({*std::move(session), row[3].as<std::string>()});
+      auto session =
+          records::listed(row[2].as<std::string>(), {bytes_of(row[0]), number_of(row[1])});
+      if (!session) continue;
+      session->replica = row[3].as<std::string>();
+      sessions.push_back(*std::move(session));
     }
   });
   return sessions;

@@ -61,6 +61,33 @@ inline constexpr const char* kVersions[] = {R"(
                        FROM weft.replica a WHERE a.number = asker), true)
       END)
   $$;
+)",
+                                              R"(
+  -- a large value that sessions name, whole or not
+  CREATE TABLE weft.asset (
+    hash TEXT COLLATE "C",                -- SHA-256 of the bytes, 64 hexadecimal digits
+    principal TEXT COLLATE "C",           -- whose it is
+    size BIGINT NOT NULL,                 -- bytes in all
+    received BIGINT NOT NULL,             -- bytes that are there
+    content TEXT NOT NULL,                -- of the pieces
+    made BIGINT NOT NULL,                 -- when it became whole, us since 1970; 0: it is not
+    facts BYTEA NOT NULL,                 -- weft.v1.MeshFacts of a whole one
+    unused_since BIGINT NOT NULL,         -- us since 1970
+    PRIMARY KEY (hash, principal));
+  CREATE INDEX ON weft.asset (content);
+  CREATE TABLE weft.asset_piece (
+    content TEXT,
+    number BIGINT,                        -- 0, 1, 2 ... of 1 MiB each but the last
+    data BYTEA NOT NULL,
+    PRIMARY KEY (content, number));
+  ALTER TABLE weft.asset_piece ALTER COLUMN data SET STORAGE EXTERNAL;
+  CREATE TABLE weft.asset_use (
+    uid TEXT REFERENCES weft.session ON DELETE CASCADE,
+    hash TEXT COLLATE "C",
+    principal TEXT COLLATE "C",           -- whose session it is
+    PRIMARY KEY (uid, hash),
+    FOREIGN KEY (hash, principal) REFERENCES weft.asset);
+  CREATE INDEX ON weft.asset_use (hash, principal);
 )"};
 
 }  // namespace weft::postgres

@@ -4,6 +4,8 @@
 #include <zlib.h>
 
 #include "server/convert/convert.h"
+#include "server/convert/mesh.h"
+#include "server/convert/names.h"
 #include "weft/storage/v1/storage.pb.h"
 
 namespace weft::records {
@@ -60,6 +62,11 @@ void set(stored::LogEntry* to, const Acted& from) {
 
 void set(stored::LogEntry* to, const SnapshotKept& from) {
   to->mutable_snapshot_kept()->set_id(from.id);
+}
+
+SessionIdentity identity_of(const stored::KeptSession& from) {
+  return {from.id(),    from.uid(),           from.numerics_id(), time_of(from.create_time()),
+          from.owner(), from.max_frame_work()};
 }
 
 Acted acted_of(const stored::Acted& from) {
@@ -143,11 +150,22 @@ std::string encode(const LogEntry& entry) {
   return to.SerializeAsString();
 }
 
-KeptSession decode_session(const std::string& bytes) {
+KeptSession decode_session(const std::string& bytes, Assets& assets) {
   const auto from = parse<stored::KeptSession>(bytes);
-  return {{from.id(), from.uid(), from.numerics_id(), time_of(from.create_time()), from.owner(),
-           from.max_frame_work()},
-          trusted(to_scene(from.scene(), "scene"))};
+  const auto find_mesh = [&](const std::string& name) {
+    const auto asset = assets.find(hash_of(name), from.owner());
+    return asset && asset->create_time ? read_mesh(assets, *asset) : nullptr;
+  };
+  return {identity_of(from), trusted(to_scene(from.scene(), "scene", find_mesh))};
+}
+
+std::shared_ptr<const v1::MeshData> read_mesh(Assets& assets, const KeptAsset& asset) {
+  const std::string bytes = assets.bytes(asset);
+  auto mesh = std::make_shared<v1::MeshData>();
+  if (sha256(bytes) != asset.hash || !mesh->ParseFromString(bytes))
+    throw StoreError(asset_name(asset.hash) +
+                     " is damaged: its bytes are others than its name says");
+  return mesh;
 }
 
 Progress decode_progress(const std::string& bytes) {
@@ -167,11 +185,12 @@ std::string entry_key(const std::string& uid, std::int64_t number) {
   return uid + "/" + std::to_string(number);
 }
 
-std::optional<KeptSession> kept(const std::string& uid, const Row& session) try {
-  if (session.checksum != checksum(uid, session.record)) return std::nullopt;
-  return decode_session(session.record);
-} catch (const StoreError&) {
-  return std::nullopt;
+std::optional<ListedSession> listed(const std::string& uid, const Row& session) {
+  stored::KeptSession kept;
+  const bool sound =
+      session.checksum == checksum(uid, session.record) && kept.ParseFromString(session.record);
+  if (!sound) return std::nullopt;
+  return ListedSession{identity_of(kept), std::move(*kept.mutable_scene()), ""};
 }
 
 std::optional<std::string> owner_of(const std::string& uid, const Row& session) {
@@ -182,10 +201,10 @@ std::optional<std::string> owner_of(const std::string& uid, const Row& session) 
 }
 
 LeftSession assemble(const std::string& uid, const std::string& id, const Row& session,
-                     const Row& progress, const std::vector<NumberedRow>& entries) {
+                     const Row& progress, const std::vector<NumberedRow>& entries, Assets& assets) {
   if (session.checksum != checksum(uid, session.record))
     throw StoreError("the checksum of its scene is wrong");
-  LeftSession left{decode_session(session.record), {}};
+  LeftSession left{decode_session(session.record, assets), {}};
   if (left.session.identity.id != id || left.session.identity.uid != uid)
     throw StoreError("it has another name");
   if (progress.checksum != checksum(uid, progress.record))

@@ -4,11 +4,14 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "server/store/assets.h"
 #include "server/store/store.h"
+#include "weft/v1/mesh.pb.h"
 
 // What is kept, as bytes (weft.storage.v1). Decoding throws StoreError for bytes that say nothing
 // which this version understands.
@@ -27,7 +30,8 @@ std::string encode(const Progress& progress);
 std::string encode(const LogEntry& entry);
 std::string encode(const std::string& uid, const SessionSnapshot& snapshot);
 
-KeptSession decode_session(const std::string& bytes);
+// With the meshes of the assets that its scene names, which are its owner's.
+KeptSession decode_session(const std::string& bytes, Assets& assets);
 Progress decode_progress(const std::string& bytes);
 LogEntry decode_entry(const std::string& bytes);
 SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes);
@@ -44,10 +48,13 @@ struct NumberedRow : Row {
 // A session of its rows, entries in order of number, without its named snapshots. Throws StoreError
 // for what cannot be trusted.
 LeftSession assemble(const std::string& uid, const std::string& id, const Row& session,
-                     const Row& progress, const std::vector<NumberedRow>& entries);
+                     const Row& progress, const std::vector<NumberedRow>& entries, Assets& assets);
 
-// A session as it was created, where the row can be trusted.
-std::optional<KeptSession> kept(const std::string& uid, const Row& session);
+// The mesh of a whole asset. Throws StoreError where it is damaged.
+std::shared_ptr<const v1::MeshData> read_mesh(Assets& assets, const KeptAsset& asset);
+
+// What lists show of a session, where the row can be trusted.
+std::optional<ListedSession> listed(const std::string& uid, const Row& session);
 
 // Its principal, where so much can be trusted.
 std::optional<std::string> owner_of(const std::string& uid, const Row& session);

@@ -12,9 +12,12 @@
 #include <set>
 #include <utility>
 
+#include "server/convert/convert.h"
+#include "server/store/assets.h"
 #include "server/store/records.h"
 #include "server/store/snapshot_files.h"
 #include "server/store/snapshots.h"
+#include "server/store/sqlite_tables.h"
 #include "server/store/write_queue.h"
 
 namespace weft {
@@ -103,6 +106,7 @@ class SqliteStore final : public SessionStore {
   std::unique_ptr<SessionLog> log_of(const std::string& uid, std::int64_t entries) override;
   void erase(const std::string& uid, const Request& deletion,
              const SessionLog::Written& written) override;
+  Assets& assets() override { return assets_; }
 
   bool has_others() const override;
   Claim claim(const std::string& id) override;
@@ -119,6 +123,7 @@ class SqliteStore final : public SessionStore {
   };
 
   static SQLite::Database open(const std::string& path);
+  void release(const std::string& uid);
   static void keep_request(SQLite::Database& database, const Request& request,
                            const std::string& uid);
   LeftSession load_session(const std::string& uid, const std::string& id,
@@ -131,6 +136,9 @@ class SqliteStore final : public SessionStore {
 
   const std::string path_;
   SQLite::Database database_;  // used by load(), then by the thread alone
+  // in a file of their own: large writes do not hold up those of calls
+  Assets assets_{
+      open_sqlite_tables(std::filesystem::path(path_).replace_filename("assets.db").string())};
   mutable std::mutex mutex_;
   // Sessions that the server has not, by id; guarded by mutex_.
   std::map<std::string, SessionIdentity> let_go_;
@@ -194,6 +202,7 @@ LeftBehind SqliteStore::load() try {
     uids.insert(uid);
   }
   SnapshotFiles(snapshot_directory_).keep_only(uids);
+  assets_.keep_only(uids, std::chrono::system_clock::now());
   return left;
 } catch (const SQLite::Exception& error) {
   throw StoreError(text_of(path_, error));
@@ -213,7 +222,7 @@ LeftSession SqliteStore::load_session(const std::string& uid, const std::string&
     entries.push_back(
         {{blob(row.getColumn(1)), row.getColumn(2).getInt64()}, row.getColumn(0).getInt64()});
   }
-  LeftSession left = records::assemble(uid, id, session, progress, entries);
+  LeftSession left = records::assemble(uid, id, session, progress, entries, assets_);
   left.saved.named = snapshots_.named(uid, left.saved.entries());
   return left;
 }
@@ -226,6 +235,7 @@ void SqliteStore::add(const KeptSession& session, const Request& creation,
     const auto there = let_go_.find(session.identity.id);
     if (there != let_go_.end()) throw SessionExists(there->second.owner);
   }
+  assets_.use(uid, session.identity.owner, assets_of(session.scene));
   records::Progress come;
   if (beginning != nullptr) {
     snapshots_.begin(uid, *beginning);
@@ -261,9 +271,19 @@ void SqliteStore::erase(const std::string& uid, const Request& deletion,
         keep_request(database, deletion, uid);
       },
       [this, uid, written](const std::string& error) {
-        if (error.empty()) snapshots_.erase(uid);
+        if (error.empty()) {
+          snapshots_.erase(uid);
+          release(uid);
+        }
         written(error);
       });
+}
+
+// Where that cannot be written, a restart makes up for it.
+void SqliteStore::release(const std::string& uid) try {
+  assets_.release(uid, std::chrono::system_clock::now());
+} catch (const StoreError& error) {
+  spdlog::warn("assets of a session that was deleted are still in use: {}", error.what());
 }
 
 void SqliteStore::keep_request(SQLite::Database& database, const Request& request,
@@ -403,10 +423,10 @@ std::vector<ListedSession> SqliteStore::list(const std::string& after, std::size
                           "SELECT uid, record, checksum FROM session WHERE id > ? ORDER BY id");
     row.bind(1, after);
     while (sessions.size() < count && row.executeStep()) {
-      auto session = records::kept(row.getColumn(0).getString(),
-                                   {blob(row.getColumn(1)), row.getColumn(2).getInt64()});
+      auto session = records::listed(row.getColumn(0).getString(),
+                                     {blob(row.getColumn(1)), row.getColumn(2).getInt64()});
       if (session && (!owner || session->identity.owner == *owner))
-        sessions.push_back({*std::move(session), ""});
+        sessions.push_back(*std::move(session));
     }
   });
   return sessions;

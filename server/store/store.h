@@ -11,8 +11,11 @@
 
 #include "core/model/scene.h"
 #include "server/session/session.h"
+#include "weft/v1/scene.pb.h"
 
 namespace weft {
+
+class Assets;
 
 // What is kept of a session from its beginning on.
 struct KeptSession {
@@ -63,7 +66,8 @@ using Claim = std::variant<std::monostate, Elsewhere, LeftSession, DamagedSessio
 
 // A session of any server.
 struct ListedSession {
-  KeptSession session;
+  SessionIdentity identity;
+  v1::Scene scene;      // as it was created
   std::string replica;  // that has it; empty: none
 };
 
@@ -109,6 +113,10 @@ class SessionStore {
   // Forgets a session, if it is there; `written` as in SessionLog.
   virtual void erase(const std::string& uid, const Request& deletion,
                      const SessionLog::Written& written) = 0;
+
+  // What sessions name. A session that is added uses those that its scene names, which its owner
+  // has; one that is erased does no more.
+  virtual Assets& assets() = 0;
 
   // What follows is for sessions that the store has and this server has not. All of it waits for
   // the store, and throws StoreError.

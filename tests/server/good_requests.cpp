@@ -7,6 +7,7 @@
 #include <map>
 
 #include "tests/server/mutations.h"
+#include "tests/support/service/assets.h"
 #include "tests/support/service/service.h"
 #include "weft/v1/frame.pb.h"
 #include "weft/v1/lab.pb.h"
@@ -118,6 +119,8 @@ v1::Scene full_scene() {
   return scene;
 }
 
+std::string known_asset() { return square_mesh(1).SerializeAsString(); }
+
 std::vector<std::string> known_requests(const std::string& type) {
   static const std::multimap<std::string, std::string> known = {
       {"CreateSessionRequest", ""},  // its scene is full_scene()
@@ -152,6 +155,11 @@ std::vector<std::string> known_requests(const std::string& type) {
       {"ViewFramesRequest",
        "session: 'sessions/it' format { encoding: FRAME_ENCODING_QUANTIZED_ZSTD velocities: true "
        "stats: true grid_step_m: 0.001 } credits: 2"},
+      {"UploadAssetRequest", ""},  // of another asset
+      {"GetAssetRequest", ""},     // of known_asset()
+      {"DownloadAssetRequest", "offset: 7"},
+      {"DeleteAssetRequest", "allow_missing: true"},
+      {"ListAssetsRequest", "page_size: 5"},
       {"GetTextileRequest", "name: 'textiles/denim_11oz'"},
       {"RunTestRequest",
        "test: LAB_TEST_BENDING textile { measured { areal_density_kg_per_m2: 0.2 "
@@ -203,6 +211,14 @@ std::vector<std::unique_ptr<Message>> good_requests(const Descriptor& type) {
       *create->mutable_session()->mutable_scene() = full_scene();
       create->set_session_id("new");
       create->set_validate_only(true);
+    }
+    if (const auto* field = type.FindFieldByName("name"); type.name().ends_with("AssetRequest"))
+      request.GetReflection()->SetString(&request, field, name_of_asset(known_asset()));
+    if (auto* upload = dynamic_cast<v1::UploadAssetRequest*>(&request)) {
+      const std::string bytes = square_mesh(2).SerializeAsString();
+      upload->set_name(name_of_asset(bytes));
+      upload->set_size_bytes(static_cast<std::int64_t>(bytes.size()));
+      upload->set_data(bytes);
     }
   }
   const int variants = requests.empty() ? 4 : 0;

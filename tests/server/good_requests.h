@@ -14,6 +14,9 @@ namespace weft::testing {
 // A scene with every field of the interface in it.
 v1::Scene full_scene();
 
+// Bytes of the asset that requests speak of.
+std::string known_asset();
+
 // Good requests of a type, as text; of a type that has none here they are made up from its fields.
 std::vector<std::string> known_requests(const std::string& type);
 

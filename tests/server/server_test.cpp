@@ -252,6 +252,7 @@ TEST(Config, SharesADatabaseUnderANameThatALoadBalancerCanSpell) {
   EXPECT_EQ(config({"--replica", "weftd-1"}).server.replica, "weftd-1");
   EXPECT_THAT(refusal({"--replica", "Cloth 1"}), HasSubstr("replica is \"Cloth 1\", not 1 to 63"));
   EXPECT_EQ(config({}).server.idle, std::chrono::hours(1));
+  EXPECT_EQ(config({"--asset-ttl-s", "60"}).server.asset_ttl, std::chrono::minutes(1));
   EXPECT_THAT(refusal({"--idle-s", "-1"}), HasSubstr("--idle-s is -1, not within 0 to"));
 }
 
@@ -278,6 +279,10 @@ TEST(Config, HelpsWithEveryFlag) {
                            "--max-total-particles",
                            "--max-streams-per-principal",
                            "--max-tests",
+                           "--max-asset-bytes",
+                           "--max-asset-bytes-per-principal",
+                           "--max-total-asset-bytes",
+                           "--asset-ttl-s",
                            "--history-bytes",
                            "--log-level"}) {
     EXPECT_THAT(help, HasSubstr(flag));

@@ -6,9 +6,11 @@
 #include <numbers>
 #include <string>
 
+#include "core/forces/curvature.h"
+#include "core/forces/membrane.h"
 #include "core/motion/sheet_solver.h"
-#include "core/triangles/curvature.h"
-#include "core/triangles/membrane.h"
+#include "core/triangles/fit.h"
+#include "core/triangles/rest_shape.h"
 #include "tests/support/core/reference_case.h"
 #include "tests/support/core/scenes.h"
 #include "tests/support/core/triangle_meshes.h"
@@ -18,6 +20,13 @@ namespace {
 
 constexpr MembraneStiffness kMembrane{80, 50, 8, 30};
 constexpr BendStiffness kBend{2e-6, 1e-6, 1.5e-6};
+
+Surface membrane_of(const RestShape& shape) {
+  return {.membrane = make_membrane(shape), .stretch = {kMembrane}};
+}
+Surface bending_of(const RestShape& shape, const BendStiffness& stiffness) {
+  return {.fits = fit_curvature(shape), .bend = {stiffness}};
+}
 
 class OnEveryMesh : public ::testing::TestWithParam<Cut> {
  protected:
@@ -56,15 +65,12 @@ Matrix3Xd gradient_force(const Matrix3Xd& x, double step, const Energy& energy) 
 TEST_P(OnEveryMesh, ForcesAreTheGradientOfTheEnergy) {
   const RestShape shape = square(GetParam(), 0.2, 0.04);
   const Matrix3Xd x = rough(shape);
-  const auto elements = make_membrane(shape);
-  const auto fits = fit_curvature(shape);
+  const Surface stretched = membrane_of(shape), bent = bending_of(shape, kBend);
   Matrix3Xd membrane = Matrix3Xd::Zero(3, x.cols()), bend = membrane;
-  add_membrane_forces(elements, kMembrane, x, membrane);
-  add_curvature_forces(fits, kBend, x, bend);
-  const auto membrane_at = [&](const Matrix3Xd& at) {
-    return membrane_energy(elements, kMembrane, at);
-  };
-  const auto bend_at = [&](const Matrix3Xd& at) { return curvature_energy(fits, kBend, at); };
+  add_membrane_forces(stretched, x, membrane);
+  add_curvature_forces(bent, x, bend);
+  const auto membrane_at = [&](const Matrix3Xd& at) { return membrane_energy(stretched, at); };
+  const auto bend_at = [&](const Matrix3Xd& at) { return curvature_energy(bent, at); };
   EXPECT_LT((membrane - gradient_force(x, 1e-6, membrane_at)).cwiseAbs().maxCoeff(), 1e-7);
   EXPECT_LT((bend - gradient_force(x, 1e-4, bend_at)).cwiseAbs().maxCoeff(),
             1e-9 * bend.cwiseAbs().maxCoeff() + 1e-12);
@@ -74,8 +80,8 @@ TEST_P(OnEveryMesh, ForcesKeepMomentumAndAngularMomentum) {
   const RestShape shape = square(GetParam(), 0.2, 0.04);
   const Matrix3Xd x = rough(shape);
   Matrix3Xd force = Matrix3Xd::Zero(3, x.cols());
-  add_membrane_forces(make_membrane(shape), kMembrane, x, force);
-  add_curvature_forces(fit_curvature(shape), kBend, x, force);
+  add_membrane_forces(membrane_of(shape), x, force);
+  add_curvature_forces(bending_of(shape, kBend), x, force);
   Vector3d torque = Vector3d::Zero();
   for (Eigen::Index i = 0; i < x.cols(); ++i)
     torque += Vector3d(x.col(i)).cross(Vector3d(force.col(i)));
@@ -88,7 +94,7 @@ TEST_P(OnEveryMesh, ForcesKeepMomentumAndAngularMomentum) {
 // W / A = E_u e^2 / 2 for a stretch along the warp by s, e = s + s^2 / 2, and G g^2 / 2
 TEST_P(OnEveryMesh, AStretchedOrShearedSheetStoresTheEnergyOfItsStiffness) {
   const RestShape shape = square(GetParam(), 0.2, 0.04);
-  const auto elements = make_membrane(shape);
+  const Surface surface = membrane_of(shape);
   const double whole = areas(shape).sum();
   const double s = 0.02, e = s + s * s / 2;
   Matrix3Xd warp = flat(shape), weft = warp, sheared = warp;
@@ -96,21 +102,19 @@ TEST_P(OnEveryMesh, AStretchedOrShearedSheetStoresTheEnergyOfItsStiffness) {
   weft.row(2) *= 1 + s;
   sheared.row(1) += s * sheared.row(2);  // out of its plane, for more than one component
   sheared.row(0) += s * sheared.row(2);
-  EXPECT_NEAR(membrane_energy(elements, kMembrane, warp), whole * kMembrane.warp * e * e / 2,
-              1e-12);
-  EXPECT_NEAR(membrane_energy(elements, kMembrane, weft), whole * kMembrane.weft * e * e / 2,
-              1e-12);
+  EXPECT_NEAR(membrane_energy(surface, warp), whole * kMembrane.warp * e * e / 2, 1e-12);
+  EXPECT_NEAR(membrane_energy(surface, weft), whole * kMembrane.weft * e * e / 2, 1e-12);
   const double stretched = s * s;  // (V.V - 1) / 2 with V = (s, s, 1)
-  EXPECT_NEAR(membrane_energy(elements, kMembrane, sheared),
+  EXPECT_NEAR(membrane_energy(surface, sheared),
               whole * (kMembrane.shear * s * s + kMembrane.weft * stretched * stretched) / 2,
               1e-12);
-  EXPECT_NEAR(strain(elements[0], warp).warp, e, 1e-12);
+  EXPECT_NEAR(strain_of(threads_of(surface.membrane[0], warp)).warp, e, 1e-12);
 }
 
 // B / 2 kappa^2 on a cylinder of radius 1 m, whose axis lies at any angle to the threads
 TEST_P(OnEveryMesh, ACylinderStoresTheEnergyOfTheRigidityInEveryDirection) {
   const RestShape shape = square(GetParam(), 0.4, 0.04);
-  const auto fits = fit_curvature(shape);
+  const Surface even = bending_of(shape, {1, 1, 1}), uneven = bending_of(shape, kBend);
   const double whole = areas(shape).sum();
   const auto points = points_of(shape);
   for (const int degrees : {0, 30, 45, 90}) {
@@ -122,21 +126,20 @@ TEST_P(OnEveryMesh, ACylinderStoresTheEnergyOfTheRigidityInEveryDirection) {
       const double along = c * point.x() + s * point.y();
       x.col(i) << std::sin(along), -std::cos(along), c * point.y() - s * point.x();
     }
-    EXPECT_NEAR(curvature_energy(fits, {1, 1, 1}, x) / (whole / 2), 1, 0.002) << degrees;
+    EXPECT_NEAR(curvature_energy(even, x) / (whole / 2), 1, 0.002) << degrees;
     // orthotropic: B_u c^4 + B_v s^4 + 2 B_t c^2 s^2
     const double rigidity =
         kBend.warp * std::pow(c, 4) + kBend.weft * std::pow(s, 4) + 2 * kBend.twist * c * c * s * s;
-    EXPECT_NEAR(curvature_energy(fits, kBend, x) / (whole / 2) / rigidity, 1, 0.002) << degrees;
+    EXPECT_NEAR(curvature_energy(uneven, x) / (whole / 2) / rigidity, 1, 0.002) << degrees;
   }
 }
 
 TEST_P(OnEveryMesh, AFlatSheetResistsNoTurnStretchOrShearByBending) {
   const RestShape shape = square(GetParam(), 0.2, 0.04);
-  const auto fits = fit_curvature(shape);
   Eigen::Matrix3d any;
   any << 1.1, 0.2, -0.3, 0.4, 0.9, 0.1, -0.2, 0.3, 1.3;
   const Matrix3Xd x = any * flat(shape);
-  EXPECT_LT(curvature_energy(fits, {1, 1, 1}, x), 1e-20);
+  EXPECT_LT(curvature_energy(bending_of(shape, {1, 1, 1}), x), 1e-20);
 }
 
 TEST(Triangles, AParticleHasAThirdOfTheAreaAroundIt) {
@@ -157,8 +160,8 @@ struct MeshCase {
     std::vector<Vector2d> points;
     for (const auto& point : data["rest_uv"]) points.emplace_back(point[0], point[1]);
     const RestShape shape = rest_shape(points, data["triangles"]);
-    elements = make_membrane(shape);
-    stiffness = {data["E_u"], data["E_v"], data["E_uv"], data["G"]};
+    surface.membrane = make_membrane(shape);
+    surface.stretch = {{data["E_u"], data["E_v"], data["E_uv"], data["G"]}};
     damping = data["k_damping"];
     pairs = edges(shape);
     const VectorXd mass = areas(shape) * data["areal_density"].get<double>();
@@ -179,7 +182,7 @@ struct MeshCase {
   double error(double dt) {
     dynamics.force = [this](double, const Matrix3Xd& x, const Matrix3Xd& v, Matrix3Xd& force) {
       force.setZero(3, x.cols());
-      add_membrane_forces(elements, stiffness, x, force);
+      add_membrane_forces(surface, x, force);
       for (const auto& [i, j] : pairs) {
         const Vector3d pull = damping * (v.col(j) - v.col(i));
         force.col(i) += pull;
@@ -201,8 +204,7 @@ struct MeshCase {
     return worst;
   }
 
-  std::vector<MembraneElement> elements;
-  MembraneStiffness stiffness;
+  Surface surface;
   double damping = 0;
   std::vector<Connection> pairs;
   Dynamics dynamics;

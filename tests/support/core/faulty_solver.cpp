@@ -54,11 +54,12 @@ class FaultySolver : public SheetSolver {
 
 SolverFactory faulty_solvers(const Fault& fault) {
   return [fault, times = std::make_shared<int>(fault.times)](
-             const Scene& scene, const SheetDefinition& sheet, const Dynamics& dynamics) {
+             const Scene& scene, const SheetDefinition& sheet, const Mesh& mesh,
+             const Dynamics& dynamics) {
     // half a frame before the end of it
     const double from = (static_cast<double>(fault.frame) - 0.5) * scene.solver.frame_step;
-    return std::make_unique<FaultySolver>(make_solver(scene, sheet, dynamics), from, fault.jump,
-                                          times);
+    return std::make_unique<FaultySolver>(make_solver(scene, sheet, mesh, dynamics), from,
+                                          fault.jump, times);
   };
 }
 

@@ -57,4 +57,15 @@ RestShape square(Cut cut, double width, double spacing) {
   return rest_shape(points, triangles);
 }
 
+TriangleMesh triangle_mesh(const RestShape& shape) {
+  TriangleMesh mesh;
+  // with the warp along the v axis
+  for (const Vector2d& point : points_of(shape)) {
+    mesh.flat.emplace_back(-point.y(), point.x());
+    mesh.start.emplace_back(point.x(), 0, point.y());
+  }
+  mesh.triangles = shape.triangles;
+  return mesh;
+}
+
 }  // namespace weft::testing

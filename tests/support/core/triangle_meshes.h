@@ -19,4 +19,7 @@ RestShape rest_shape(const std::vector<Vector2d>& points,
 // (u, v) of each particle, by its first corner.
 std::vector<Vector2d> points_of(const RestShape& shape);
 
+// A mesh with that flat shape, corners of one particle alike, lying flat; its warp along u.
+TriangleMesh triangle_mesh(const RestShape& shape);
+
 }  // namespace weft::testing

@@ -14,6 +14,7 @@
 
 #include "google/rpc/error_details.pb.h"
 #include "server/server.h"
+#include "weft/v1/asset.grpc.pb.h"
 #include "weft/v1/frame.grpc.pb.h"
 #include "weft/v1/server.grpc.pb.h"
 #include "weft/v1/session.grpc.pb.h"
@@ -80,6 +81,7 @@ class Service {
   std::unique_ptr<v1::SessionService::Stub> sessions = v1::SessionService::NewStub(channel);
   std::unique_ptr<v1::FrameService::Stub> frames = v1::FrameService::NewStub(channel);
   std::unique_ptr<v1::ServerService::Stub> servers = v1::ServerService::NewStub(channel);
+  std::unique_ptr<v1::AssetService::Stub> assets = v1::AssetService::NewStub(channel);
 };
 
 // A call of StreamFrames.

@@ -1,0 +1,77 @@
+#include "core/motion/surface_bound.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "core/forces/curvature.h"
+
+namespace weft {
+
+double stiffness_bound(const MembraneElement& element, const MembraneStiffness& stiffness,
+                       double strain) {
+  double uu = 0, uv = 0, vv = 0;  // sums over the corners, 1/m^2
+  for (std::size_t k = 0; k < 3; ++k) {
+    uu += element.du[k] * element.du[k];
+    uv += element.du[k] * element.dv[k];
+    vv += element.dv[k] * element.dv[k];
+  }
+  // B^T C B has the eigenvalues of L^T (B B^T) L with C = L L^T
+  Eigen::Matrix3d strains, law;
+  strains << uu, 0, uv, 0, vv, uv, uv, uv, uu + vv;
+  law << stiffness.warp, stiffness.coupling, 0, stiffness.coupling, stiffness.weft, 0, 0, 0,
+      stiffness.shear;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(law);
+  const Eigen::Matrix3d root = solver.eigenvectors() *
+                               solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
+                               solver.eigenvectors().transpose();
+  const Eigen::Matrix3d material = root * strains * root;
+  const double material_most =
+      solver.computeDirect(material, Eigen::EigenvaluesOnly).eigenvalues().maxCoeff();
+  const double laplacian = (uu + vv) / 2 + std::hypot((uu - vv) / 2, uv);
+  const double green = strain + strain * strain / 2;
+  const double stress =
+      green * (std::max(stiffness.warp, stiffness.weft) + stiffness.coupling + 2 * stiffness.shear);
+  constexpr double kRounding = 1 + 1e-9;  // of eigenvalues in closed form
+  return kRounding * element.area *
+         ((1 + strain) * (1 + strain) * material_most + stress * laplacian);
+}
+
+SurfaceBound surface_bound(const Mesh& mesh, double strain) {
+  SurfaceBound bound{VectorXd::Zero(mesh.mass.size()), VectorXd::Zero(mesh.mass.size())};
+  const Surface& surface = mesh.surface;
+  for (const MembraneElement& element : surface.membrane) {
+    const double most =
+        stiffness_bound(element, surface.stretch[static_cast<std::size_t>(element.panel)], strain);
+    for (const int i : element.particle) bound.membrane[i] += most;
+  }
+  for (const CurvatureFit& fit : surface.fits) {
+    const Vector3d stiffness = fit_stiffness(surface, fit);
+    Vector3d sums = Vector3d::Zero();
+    for (const auto& weight : fit.weight)
+      sums += Vector3d(weight[0], weight[1], weight[2]).cwiseAbs();
+    const Vector3d row = stiffness.cwiseProduct(sums);
+    for (std::size_t k = 0; k < fit.particle.size(); ++k)
+      bound.bend[fit.particle[k]] +=
+          row.dot(Vector3d(fit.weight[k][0], fit.weight[k][1], fit.weight[k][2]).cwiseAbs());
+  }
+  return bound;
+}
+
+std::vector<double> triangle_steps(const Mesh& mesh, double strain) {
+  VectorXd area = VectorXd::Zero(mesh.mass.size());
+  for (const MembraneElement& element : mesh.surface.membrane)
+    for (const int i : element.particle) area[i] += element.area;
+  std::vector<double> steps;
+  steps.reserve(mesh.surface.membrane.size());
+  for (const MembraneElement& element : mesh.surface.membrane) {
+    const double stiffness = stiffness_bound(
+        element, mesh.surface.stretch[static_cast<std::size_t>(element.panel)], strain);
+    double density = 0;  // a third of it, kg/m^2
+    for (const int i : element.particle) density += mesh.mass[i] / area[i] / 3;
+    steps.push_back(2 * std::sqrt(density * element.area / stiffness));
+  }
+  return steps;
+}
+
+}  // namespace weft

@@ -1,0 +1,74 @@
+#include "core/triangles/triangles.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/triangles/fit.h"
+#include "core/triangles/rest_shape.h"
+
+namespace weft {
+namespace {
+
+const MeasuredTextile& measured(const SheetDefinition& sheet, int panel) {
+  return std::get<MeasuredTextile>(textile_of(sheet, panel).model);
+}
+
+// Mass and drag go by area.
+void set_particles(const SheetDefinition& sheet, const RestShape& shape, Mesh& mesh) {
+  mesh.mass = VectorXd::Zero(shape.particles);
+  VectorXd drag = mesh.mass;
+  for (std::size_t t = 0; t < shape.triangles.size(); ++t) {
+    const MeasuredTextile& textile = measured(sheet, panel_of(shape, t));
+    const double third = area(shape.corners[t]) / 3;
+    for (const int i : shape.triangles[t]) {
+      mesh.mass[i] += textile.areal_density * third;
+      drag[i] += textile.air_drag * third;
+    }
+  }
+  if (drag.maxCoeff() > 0) mesh.drag = drag;
+}
+
+}  // namespace
+
+const Textile& textile_of(const SheetDefinition& sheet, int panel) {
+  for (const PanelTextile& each : sheet.panel_textiles)
+    if (each.panel == panel) return each.textile;
+  return sheet.textile;
+}
+
+double least_density(const SheetDefinition& sheet) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t p = 0; p < triangles_in(sheet).panels.size(); ++p)
+    least = std::min(least, measured(sheet, static_cast<int>(p)).areal_density);
+  return least;
+}
+
+Mesh make_triangles(const SheetDefinition& sheet) {
+  const RestShape shape = rest_shape(triangles_in(sheet));
+  Mesh mesh;
+  mesh.damping = sheet.textile.damping.value_or(kDefaultDamping);
+  set_particles(sheet, shape, mesh);
+
+  Surface& surface = mesh.surface;
+  surface.pushes = resists_compression(sheet.bending);
+  bool stretches = false, bends = false;
+  for (std::size_t p = 0; p < triangles_in(sheet).panels.size(); ++p) {
+    const MeasuredTextile& textile = measured(sheet, static_cast<int>(p));
+    surface.stretch.push_back({textile.tensile_warp, textile.tensile_weft, 0, textile.shear});
+    surface.bend.push_back({textile.bend_rigidity_warp, textile.bend_rigidity_weft,
+                            (textile.bend_rigidity_warp + textile.bend_rigidity_weft) / 2});
+    stretches |= textile.tensile_warp + textile.tensile_weft + textile.shear > 0;
+    bends |= textile.bend_rigidity_warp + textile.bend_rigidity_weft > 0;
+  }
+  // what pulls at nothing is not there
+  if (stretches) surface.membrane = make_membrane(shape);
+  if (bends) surface.fits = fit_curvature(shape);
+  if (mesh.damping > 0) {
+    Family& family = mesh.families.emplace_back(Family{FamilyKind::kDamp, 0, 0, {}, {}});
+    for (const auto& [i, j] : edges(shape)) family.connections.add(i, j);
+  }
+  mesh.triangles = shape.triangles;
+  return mesh;
+}
+
+}  // namespace weft

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+
+#include "core/model/mesh.h"
+
+namespace weft {
+
+// Precondition: the sheet is of triangles, here and below.
+inline const TriangleMesh& triangles_in(const SheetDefinition& sheet) {
+  return *std::get<Triangles>(sheet.shape);
+}
+
+// The textile of a panel.
+const Textile& textile_of(const SheetDefinition& sheet, int panel);
+
+// Of all panels, kg/m^2.
+double least_density(const SheetDefinition& sheet);
+
+// A membrane and fitted curvatures, with edges that damp. Precondition: textiles are measured.
+Mesh make_triangles(const SheetDefinition& sheet);
+
+}  // namespace weft

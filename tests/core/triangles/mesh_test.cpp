@@ -1,0 +1,238 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "core/forces/curvature.h"
+#include "core/forces/elastic.h"
+#include "core/forces/membrane.h"
+#include "core/model/mesh_problems.h"
+#include "core/motion/stability.h"
+#include "core/motion/surface_bound.h"
+#include "core/simulation.h"
+#include "core/triangles/triangles.h"
+#include "tests/support/core/scenes.h"
+#include "tests/support/core/triangle_meshes.h"
+
+namespace weft::testing {
+namespace {
+
+MeasuredTextile cotton() {
+  return {.areal_density = 0.15,
+          .tensile_warp = 1000,
+          .tensile_weft = 700,
+          .shear = 40,
+          .bend_rigidity_warp = 8e-6,
+          .bend_rigidity_weft = 5e-6};
+}
+
+SheetDefinition sheet_of(TriangleMesh mesh) {
+  SheetDefinition sheet;
+  sheet.name = "cloth";
+  sheet.shape = complete(std::move(mesh));
+  sheet.textile.model = cotton();
+  sheet.bending = Isometric{};
+  return sheet;
+}
+
+Scene scene_of(TriangleMesh mesh) {
+  Scene scene;
+  scene.sheets.push_back(sheet_of(std::move(mesh)));
+  return scene;
+}
+
+class OnMeshes : public ::testing::TestWithParam<Cut> {};
+INSTANTIATE_TEST_SUITE_P(, OnMeshes,
+                         ::testing::Values(Cut::kRight, Cut::kAlternating, Cut::kEquilateral,
+                                           Cut::kIrregular));
+
+// The longest step at which a small disturbance does not grow, by bisection.
+double measured_step(const Scene& scene, const Matrix3Xd& x) {
+  const SheetDefinition& sheet = scene.sheets[0];
+  Mesh mesh = make_mesh(sheet);
+  Dynamics dynamics;
+  dynamics.inverse_mass = mesh.mass.cwiseInverse();
+  dynamics.gravity.setZero();
+  // forces about the strained shape, which is then at rest
+  Matrix3Xd held = Matrix3Xd::Zero(3, x.cols());
+  add_elastic_forces(mesh, x, Matrix3Xd::Zero(3, x.cols()), held);
+  dynamics.force = [&](double, const Matrix3Xd& at, const Matrix3Xd& v, Matrix3Xd& force) {
+    force = -held;
+    add_elastic_forces(mesh, at, v, force);
+  };
+  const auto grows = [&](double dt) {
+    const auto solver = make_plain_solver(dynamics, IntegratorKind::kVerlet);
+    const Matrix3Xd start = x + 1e-9 * noise(static_cast<int>(x.cols()));
+    solver->start(start, Matrix3Xd::Zero(3, x.cols()), 0, dt);
+    Matrix3Xd now;
+    for (int k = 0; k < 1500; ++k) {
+      solver->advance(k * dt, calling_thread());
+      if (k % 50 != 0) continue;
+      solver->positions(now);
+      if (!((now - x).cwiseAbs().maxCoeff() < 1e-6)) return true;
+    }
+    return false;
+  };
+  double low = 1e-6, high = 1e-2;
+  while (high / low > 1.003) {
+    const double middle = std::sqrt(low * high);
+    (grows(middle) ? high : low) = middle;
+  }
+  return low;
+}
+
+TEST_P(OnMeshes, TheLinearBoundLiesBelowTheMeasuredStepAndTheEstimateMeetsIt) {
+  for (const double strain : {0.0, 0.02}) {
+    Scene scene = scene_of(triangle_mesh(square(GetParam(), 0.12, 0.02)));
+    SheetDefinition& sheet = scene.sheets[0];
+    const Mesh mesh = make_mesh(sheet);
+    const Matrix3Xd x = (1 + strain) * start_positions(sheet);
+    const StableStep step =
+        stable_step(mesh, mesh.mass.cwiseInverse(), IntegratorKind::kVerlet, 0, x);
+    const double measured = measured_step(scene, x);
+    EXPECT_LE(step.linear_bound, measured * 1.003);
+    EXPECT_GT(step.linear_bound, 0.6 * measured);
+    EXPECT_NEAR(step.estimate / measured, 1, 0.02) << strain;
+    EXPECT_GE(step.limiting_particle, 0);
+  }
+}
+
+TEST(Meshes, ASliverLimitsTheStepAndIsNamed) {
+  TriangleMesh mesh = triangle_mesh(square(Cut::kRight, 0.1, 0.02));
+  mesh.flat[7].x() += 0.018;  // next to its neighbour
+  for (std::size_t i = 0; i < mesh.start.size(); ++i)
+    mesh.start[i] = {mesh.flat[i].y(), 0, mesh.flat[i].x()};
+  const Simulation simulation(scene_of(std::move(mesh)));
+  const auto& warnings = simulation.plan().warnings;
+  const auto sliver = std::find_if(warnings.begin(), warnings.end(),
+                                   [](const Warning& each) { return each.code == "SLIVER"; });
+  ASSERT_NE(sliver, warnings.end());
+  EXPECT_NE(sliver->message.find("triangle"), std::string::npos) << sliver->message;
+}
+
+TEST_P(OnMeshes, AHungSheetComesToRestAndKeepsItsEnergyBudget) {
+  Scene scene = scene_of(triangle_mesh(square(GetParam(), 0.2, 0.02)));
+  scene.sheets[0].textile.damping = 0.01;
+  scene.sheets[0].pins = {{{0}, {}}, {{10}, {}}};
+  Simulation simulation(scene);
+  ASSERT_FALSE(simulation.refusal());
+  int frames = 0;
+  while (!simulation.at_rest() && frames < 1200) {
+    ASSERT_TRUE(simulation.advance_frame()) << simulation.failure();
+    ++frames;
+  }
+  EXPECT_TRUE(simulation.at_rest());
+  EXPECT_TRUE(simulation.repairs().empty());
+  EXPECT_LT(simulation.stats().largest_strain, 0.05);
+}
+
+TEST(Meshes, ALatticeGivenAsTrianglesHangsLikeTheLattice) {
+  Scene lattice;
+  lattice.sheets.push_back(sheet_of(triangle_mesh(square(Cut::kAlternating, 0.2, 0.01))));
+  lattice.sheets[0].textile.damping = 0.02;
+  Scene grid = lattice;
+  grid.sheets[0].shape = Grid{21, 21, 0.01};
+  for (Scene* scene : {&lattice, &grid}) {
+    // two corners of one edge, warp along it
+    scene->sheets[0].pins = {{{0, 20}, {}}};
+    scene->solver.plain = true;
+  }
+  std::vector<Vector3d> lowest;
+  for (const Scene& scene : {lattice, grid}) {
+    Simulation simulation(scene);
+    for (int k = 0; k < 600 && !simulation.at_rest(); ++k) ASSERT_TRUE(simulation.advance_frame());
+    std::vector<double> x(3 * 441);
+    simulation.copy_positions(x);
+    lowest.emplace_back(x[430], x[441 + 430], x[2 * 441 + 430]);
+  }
+  EXPECT_LT((lowest[0] - lowest[1]).norm(), 0.03 * 0.2);
+}
+
+TEST(Meshes, PanelsOfOneTextileSewnWithTurnedGrainBendAsOnePiece) {
+  // the right half is cut with its grain turned by 90 degrees and its shape moved, of an even
+  // textile
+  const RestShape whole = square(Cut::kAlternating, 0.2, 0.02);
+  TriangleMesh sewn = triangle_mesh(whole);
+  TriangleMesh halves;
+  halves.start = sewn.start;
+  for (const bool right : {false, true}) {
+    int count = 0;
+    for (const auto& triangle : sewn.triangles) {
+      double middle = 0;
+      for (const int i : triangle) middle += sewn.flat[static_cast<std::size_t>(i)].y() / 3;
+      if ((middle > 0.1) != right) continue;
+      halves.triangles.push_back(triangle);
+      auto& corners = halves.flat_triangles.emplace_back();
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vector2d& flat = sewn.flat[static_cast<std::size_t>(triangle[k])];
+        corners[k] = static_cast<int>(halves.flat.size());
+        halves.flat.push_back(right ? Vector2d(3 - flat.y(), flat.x() + 1) : flat);
+      }
+      ++count;
+    }
+    halves.panels.push_back({right ? "right" : "left", count, right ? std::numbers::pi / 2 : 0});
+  }
+  const auto energy_of = [&](const SheetDefinition& sheet) {
+    const Mesh mesh = make_mesh(sheet);
+    Matrix3Xd x = start_positions(sheet);
+    for (Eigen::Index i = 0; i < x.cols(); ++i)  // a cylinder at an angle
+      x.col(i) = Vector3d(x(0, i), -0.5 * std::pow(0.6 * x(0, i) + 0.8 * x(2, i), 2), x(2, i));
+    return curvature_energy(mesh.surface, x);
+  };
+  SheetDefinition one = sheet_of(sewn), two = sheet_of(halves);
+  EXPECT_TRUE(find_problems(*std::get<Triangles>(two.shape), "").empty());
+  EXPECT_NEAR(energy_of(two) / energy_of(one), 1, 1e-9);
+}
+
+TEST(Meshes, FaultsOfTrianglesAreNamedWithTheirPlace) {
+  const auto problems = [](const std::function<void(TriangleMesh&)>& spoil) {
+    TriangleMesh mesh = triangle_mesh(square(Cut::kRight, 0.1, 0.05));
+    spoil(mesh);
+    std::string all;
+    for (const Problem& problem : find_problems(*complete(mesh), "mesh"))
+      all += problem.field + ": " + problem.message + "\n";
+    return all;
+  };
+  const auto says = [](const std::string& all, const std::string& part) {
+    return all.find(part) != std::string::npos;
+  };
+  EXPECT_EQ(problems([](TriangleMesh&) {}), "");
+  EXPECT_TRUE(says(problems([](TriangleMesh& m) { m.triangles[2][1] = 99; }),
+                   "mesh.triangles: triangle 2 has a corner of index 99; there are 9"));
+  EXPECT_TRUE(says(problems([](TriangleMesh& m) { std::swap(m.flat[4], m.flat[8]); }),
+                   "runs clockwise in the flat shape"));
+  EXPECT_TRUE(
+      says(problems([](TriangleMesh& m) { m.flat[4] = m.flat[3]; }), "has a height of 0 m"));
+  EXPECT_TRUE(says(problems([](TriangleMesh& m) { m.start[1].x() = std::nan(""); }),
+                   "mesh.positions_m: point 1 has a coordinate of nan m"));
+  EXPECT_TRUE(says(problems([](TriangleMesh& m) {
+                     m.triangles.push_back({0, 2, 4});
+                   }),
+                   "mesh.triangles: the edge between particles 0 and 4 has 3 triangles"));
+  EXPECT_TRUE(says(problems([](TriangleMesh& m) {
+                     m.triangles.push_back({3, 4, 7});
+                   }),
+                   "run along their edge between particles 0 and 1 in the same direction"));
+  EXPECT_TRUE(says(problems([](TriangleMesh& m) {
+                     m.start.emplace_back(0, 0, 0);
+                     m.flat.emplace_back(0, 0);
+                   }),
+                   "mesh.positions_m: particle 9 is in no triangle"));
+  EXPECT_TRUE(says(problems([](TriangleMesh& m) {
+                     m.panels = {{"front", 3}};
+                   }),
+                   "mesh.panels: have 3 triangles; the mesh has 8"));
+}
+
+TEST(Meshes, RawTextilesAndTheBendingOfGridsAreRefused) {
+  Scene scene = scene_of(triangle_mesh(square(Cut::kRight, 0.1, 0.05)));
+  scene.sheets[0].textile.model = RawTextile{.particle_mass = 0.001, .stretch = 100};
+  scene.sheets[0].bending = ChoiKo{};
+  const auto problems = find_problems(scene);
+  ASSERT_EQ(problems.size(), 2U);
+  EXPECT_EQ(problems[0].field, "sheets[0].textile.raw");
+  EXPECT_EQ(problems[1].field, "sheets[0].bending.choi_ko");
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -1,0 +1,152 @@
+#include "tests/support/service/assets.h"
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+#include "server/store/assets.h"
+
+namespace weft::testing {
+namespace {
+
+void authorize(grpc::ClientContext& context, const std::string& token) {
+  if (!token.empty()) context.AddMetadata("authorization", "Bearer " + token);
+}
+
+template <class Value>
+std::string bytes_of(const std::vector<Value>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Value)};
+}
+
+}  // namespace
+
+v1::MeshData square_mesh(int cells) {
+  const auto points = static_cast<std::uint32_t>(cells + 1);
+  std::vector<float> u, v;
+  std::vector<std::uint32_t> triangles;
+  for (std::uint32_t row = 0; row < points; ++row) {
+    for (std::uint32_t column = 0; column < points; ++column) {
+      u.push_back(static_cast<float>(column) / static_cast<float>(cells));
+      v.push_back(static_cast<float>(row) / static_cast<float>(cells));
+      if (row + 1 == points || column + 1 == points) continue;
+      const std::uint32_t at = row * points + column;
+      for (const std::uint32_t corner :
+           {at, at + 1, at + points, at + 1, at + points + 1, at + points})
+        triangles.push_back(corner);
+    }
+  }
+  v1::MeshData mesh;
+  mesh.set_flat_m(bytes_of(u) + bytes_of(v));
+  mesh.set_triangles(bytes_of(triangles));
+  return mesh;
+}
+
+std::string name_of_asset(const std::string& bytes) { return "assets/" + sha256(bytes); }
+
+Upload::Upload(v1::AssetService::Stub& assets, const std::string& name, std::int64_t size,
+               const std::string& token) {
+  authorize(context_, token);
+  writer_ = assets.UploadAsset(&context_, &answer_);
+  v1::UploadAssetRequest first;
+  first.set_name(name);
+  first.set_size_bytes(size);
+  writer_->Write(first);
+}
+
+Upload::~Upload() {
+  if (!writer_) return;
+  cancel();
+  writer_->Finish();
+}
+
+bool Upload::send(std::int64_t offset, const std::string& data) {
+  v1::UploadAssetRequest request;
+  request.set_offset(offset);
+  request.set_data(data);
+  return writer_->Write(request);
+}
+
+std::pair<v1::Asset, Error> Upload::finish() {
+  writer_->WritesDone();
+  const Error error(writer_->Finish());
+  writer_.reset();
+  return {answer_, error};
+}
+
+Error Upload::await_end() {
+  const Error error(writer_->Finish());
+  writer_.reset();
+  return error;
+}
+
+std::pair<v1::Asset, Error> upload(v1::AssetService::Stub& assets, const std::string& bytes,
+                                   const std::string& token, std::size_t message) {
+  const std::string name = name_of_asset(bytes);
+  const auto size = static_cast<std::int64_t>(bytes.size());
+  const auto asked = Upload(assets, name, size, token).finish();
+  if (asked.second.code != grpc::StatusCode::OK || asked.first.received_bytes() == size)
+    return asked;
+  Upload upload(assets, name, size, token);
+  for (auto at = static_cast<std::size_t>(asked.first.received_bytes()); at < bytes.size();
+       at += message)
+    if (!upload.send(static_cast<std::int64_t>(at), bytes.substr(at, message))) break;
+  return upload.finish();
+}
+
+std::pair<v1::Asset, Error> upload_as(v1::AssetService::Stub& assets, const std::string& name,
+                                      const std::string& bytes) {
+  Upload upload(assets, name, static_cast<std::int64_t>(bytes.size()));
+  upload.send(0, bytes);
+  return upload.finish();
+}
+
+std::pair<v1::Asset, Error> get_asset(v1::AssetService::Stub& assets, const std::string& name,
+                                      const std::string& token) {
+  grpc::ClientContext context;
+  authorize(context, token);
+  v1::GetAssetRequest request;
+  request.set_name(name);
+  v1::Asset asset;
+  const grpc::Status status = assets.GetAsset(&context, request, &asset);
+  return {asset, Error(status)};
+}
+
+Error delete_asset(v1::AssetService::Stub& assets, const std::string& name,
+                   const std::string& token, bool allow_missing) {
+  grpc::ClientContext context;
+  authorize(context, token);
+  v1::DeleteAssetRequest request;
+  request.set_name(name);
+  request.set_allow_missing(allow_missing);
+  v1::DeleteAssetResponse response;
+  return Error(assets.DeleteAsset(&context, request, &response));
+}
+
+std::pair<std::string, Error> download(v1::AssetService::Stub& assets, const std::string& name,
+                                       std::int64_t offset, const std::string& token) {
+  grpc::ClientContext context;
+  authorize(context, token);
+  v1::DownloadAssetRequest request;
+  request.set_name(name);
+  request.set_offset(offset);
+  const auto reader = assets.DownloadAsset(&context, request);
+  std::string bytes;
+  v1::DownloadAssetResponse message;
+  while (reader->Read(&message)) bytes += message.data();
+  return {bytes, Error(reader->Finish())};
+}
+
+v1::ListAssetsResponse list_assets(v1::AssetService::Stub& assets, int page_size,
+                                   const std::string& page_token, const std::string& token) {
+  grpc::ClientContext context;
+  authorize(context, token);
+  v1::ListAssetsRequest request;
+  request.set_page_size(page_size);
+  request.set_page_token(page_token);
+  v1::ListAssetsResponse response;
+  const grpc::Status status = assets.ListAssets(&context, request, &response);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  return response;
+}
+
+}  // namespace weft::testing

@@ -28,15 +28,14 @@ struct Reach {
 // How forces on a particle are added up, in this order.
 struct Gather {
   std::uint32_t sides = 0;
-  std::uint32_t crowded = 0;  // more sides, for more triangles at an edge that was damped already
   std::uint32_t reaches = 0;  // in fours; what is missing reaches to itself
   std::uint32_t corners = 0;  // of triangles that wind presses on
 };
 
 // What one substep does to a sheet of triangles. With l the lengths of its edges and L those in the
-// flat shape, the energy of a triangle is a quadratic form in the three l^2 - L^2: its edges pull by
-// sums of l^2. Bending is a quadratic form in all positions: its part between the ends of an edge
-// pulls like that, too, and the rest between particles farther apart.
+// flat shape, the energy of a triangle is a quadratic form in the three l^2 - L^2: its edges pull
+// by sums of l^2. Bending is a quadratic form in all positions: its part between the ends of an
+// edge pulls like that, too, and the rest between particles farther apart.
 template <class T>
 struct TriangleLaw {
   static constexpr int kLanes = 64 / sizeof(T);  // triangles in a group
@@ -48,8 +47,9 @@ struct TriangleLaw {
   bool pushes = true, bends = false;
   AlignedArray<Offset> corners;  // (groups x 3 x kLanes), of particles
   // Where triangles push: tension of edge k, N/m, the sum of s_kj l_j^2 less r_k: s_00, s_11, s_22,
-  // s_01, s_12, s_02, r_0, r_1, r_2. Otherwise three modes a_0, a_1, a_2, r, of warp and weft, which
-  // only pull, and of shear: m = a . l^2 - r, tension of edge k: the sum of m a_k, less a last three.
+  // s_01, s_12, s_02, r_0, r_1, r_2. Otherwise three modes a_0, a_1, a_2, r, of warp and weft,
+  // which only pull, and of shear: m = a . l^2 - r, tension of edge k: the sum of m a_k, less a
+  // last three.
   AlignedArray<T> stiffness;  // (groups x constants() x kLanes)
   int constants() const { return pushes ? 9 : 15; }
 
@@ -62,6 +62,10 @@ struct TriangleLaw {
     std::size_t side = 0, reach = 0, blown = 0;
   };
   std::vector<Block> blocks;
+  // Lets go of all these, until restore().
+  void release();
+  bool released() const { return gathers.size() == 0; }
+  void restore(const Mesh& mesh);
 
   T damping = 0;  // k_d / (2 dt), kg/s^2
   bool drags = false;

@@ -16,6 +16,16 @@
 HWY_BEFORE_NAMESPACE();
 namespace weft::HWY_NAMESPACE {
 
+#if HWY_TARGET == HWY_SCALAR
+
+// x, y and z of the particle that begins at p[at[0]].
+template <class D>
+HWY_INLINE Triple<hn::Vec<D>> pick(D d, const hn::TFromD<D>* p, const Offset* at) {
+  return {hn::Load(d, p + at[0]), hn::Load(d, p + at[0] + 1), hn::Load(d, p + at[0] + 2)};
+}
+
+#else
+
 // Runs of 128 bits at x + at[0], x + at[kApart], ..., side by side.
 template <int kApart, class D>
 HWY_INLINE hn::Vec<D> blocks(D d, const hn::TFromD<D>* x, const Offset* at) {
@@ -41,10 +51,11 @@ HWY_INLINE Triple<hn::Vec<D>> pick(D d, const hn::TFromD<D>* p, const Offset* at
     const auto p2 = blocks<4>(d, p, at + 2), p3 = blocks<4>(d, p, at + 3);
     const auto even = hn::InterleaveLower(d, p0, p2), odd = hn::InterleaveLower(d, p1, p3);
     return {hn::InterleaveLower(d, even, odd), hn::InterleaveUpper(d, even, odd),
-            hn::InterleaveLower(d, hn::InterleaveUpper(d, p0, p2),
-                                hn::InterleaveUpper(d, p1, p3))};
+            hn::InterleaveLower(d, hn::InterleaveUpper(d, p0, p2), hn::InterleaveUpper(d, p1, p3))};
   }
 }
+
+#endif
 
 // Tensions, and what wind does, of the groups of triangles first ... last - 1.
 template <bool kPushes, bool kBlows, class T>
@@ -79,8 +90,8 @@ void strain_groups(const TriangleLaw<T>& law, TriangleState<T>& state, int first
         const V weft = hn::Max(hn::Zero(d), sum(c(4), c(5), c(6), c(7)));
         const V shear = sum(c(8), c(9), c(10), c(11));
         for (int k = 0; k < 3; ++k)
-          put(k, hn::MulAdd(warp, c(k), hn::MulAdd(weft, c(4 + k),
-                                                   hn::MulSub(shear, c(8 + k), c(12 + k)))));
+          put(k, hn::MulAdd(warp, c(k),
+                            hn::MulAdd(weft, c(4 + k), hn::MulSub(shear, c(8 + k), c(12 + k)))));
       }
 
       if constexpr (kBlows) {
@@ -159,9 +170,6 @@ HWY_INLINE void gather_block(const TriangleLaw<T>& law, const TriangleState<T>& 
                Q::apart(x + side->particle, here));
       if constexpr (kDamps) speed.add(Q::load(w + side->particle));
     }
-    for (std::uint32_t k = 0; k < gather->crowded; ++k, ++side)
-      pull.add(tension[side->tension[0]] + tension[side->tension[1]],
-               Q::apart(x + side->particle, here));
 
     // bending by particles farther away: two sums, so that one need not wait for the other
     if constexpr (kBends) {

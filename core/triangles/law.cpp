@@ -59,13 +59,21 @@ Spokes spokes_of(int particles, const std::vector<Triangle>& triangles) {
   });
 }
 
-// The ends of a particle's edges, each once, ascending.
-std::vector<int> neighbours(const Spokes& spokes, int i) {
-  std::vector<int> all;
-  for (const Spoke& spoke : spokes.at(i)) all.push_back(spoke.to);
-  std::sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
-  return all;
+// Of each particle, the other ends of its edges and of connections that damp it, ascending.
+std::vector<std::vector<int>> neighbours_of(int particles, const Spokes& spokes, const Mesh& mesh) {
+  std::vector<std::vector<int>> near(index(particles));
+  for (int i = 0; i < particles; ++i)
+    for (const Spoke& spoke : spokes.at(i)) near[index(i)].push_back(spoke.to);
+  for (const Family& family : mesh.families)
+    for (const auto& [i, j] : family.connections) {
+      near[index(i)].push_back(j);
+      near[index(j)].push_back(i);
+    }
+  for (auto& each : near) {
+    std::sort(each.begin(), each.end());
+    each.erase(std::unique(each.begin(), each.end()), each.end());
+  }
+  return near;
 }
 
 // Rows of the matrix of the bending energy: N/m by particle, without the diagonal, for rows sum up
@@ -180,32 +188,28 @@ void set_stiffness(const MembraneElement& element, const MembraneStiffness& stif
 
 }  // namespace
 
-std::vector<int> near_order(int particles, const std::vector<Triangle>& triangles) {
+std::vector<int> near_order(const std::vector<std::vector<int>>& near) {
   constexpr std::size_t kCluster = TriangleLaw<float>::kBlock;
-  const Spokes spokes = spokes_of(particles, triangles);
   std::vector<int> order, seeds;
-  std::vector<bool> taken(index(particles));
+  std::vector<bool> taken(near.size());
+  const auto take = [&](int i) {
+    taken[index(i)] = true;
+    order.push_back(i);
+  };
   std::size_t next_seed = 0;
-  for (int start = 0; start < particles; ++start) {
-    if (taken[index(start)]) continue;
-    seeds.push_back(start);
-    while (next_seed < seeds.size()) {
-      // a cluster grows around a particle beside those before it
-      const int seed = seeds[next_seed++];
-      if (taken[index(seed)]) continue;
-      const std::size_t begin = order.size();
-      order.push_back(seed);
-      taken[index(seed)] = true;
-      std::size_t at = begin;
-      for (; at < order.size() && order.size() - begin < kCluster; ++at)
-        for (const Spoke& spoke : spokes.at(order[at])) {
-          if (taken[index(spoke.to)] || order.size() - begin == kCluster) continue;
-          taken[index(spoke.to)] = true;
-          order.push_back(spoke.to);
-        }
-      for (std::size_t k = begin; k < order.size(); ++k)
-        for (const Spoke& spoke : spokes.at(order[k]))
-          if (!taken[index(spoke.to)]) seeds.push_back(spoke.to);
+  for (std::size_t start = 0; start < near.size(); ++start) {
+    seeds.push_back(static_cast<int>(start));
+    // clusters grow, each around a particle beside those before it
+    for (; next_seed < seeds.size(); ++next_seed) {
+      if (taken[index(seeds[next_seed])]) continue;
+      const std::size_t begin = order.size(), end = begin + kCluster;
+      take(seeds[next_seed]);
+      for (std::size_t at = begin; at < order.size() && order.size() < end; ++at)
+        for (const int j : near[index(order[at])])
+          if (!taken[index(j)] && order.size() < end) take(j);
+      for (std::size_t at = begin; at < order.size(); ++at)
+        for (const int j : near[index(order[at])])
+          if (!taken[index(j)]) seeds.push_back(j);
     }
   }
   return order;
@@ -221,19 +225,27 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
   law.pushes = surface.pushes;
   law.bends = !surface.fits.empty();
 
+  // those of the membrane and those that wind presses on are the same
+  std::vector<Triangle> corners = mesh.triangles;
+  if (!surface.membrane.empty()) {
+    corners.clear();
+    for (const MembraneElement& element : surface.membrane) corners.push_back(element.particle);
+  }
+  const Spokes spokes = spokes_of(particles, corners);
+  const std::vector<std::vector<int>> near = neighbours_of(particles, spokes, mesh);
+
   // rows of bending, of which those along edges go to triangles
-  const Spokes spokes = spokes_of(particles, mesh.triangles);
-  std::vector<Vector3d> bend(mesh.triangles.size(), Vector3d::Zero());
+  std::vector<Vector3d> bend(corners.size(), Vector3d::Zero());
   using Entry = BendingRows::Entry;
   std::vector<std::vector<Entry>> far(index(particles));
   if (law.bends) {
     BendingRows rows(surface, particles);
     for (int i = 0; i < particles; ++i)
       for (const Entry& entry : rows.row(i)) {
-        const auto near = spokes.at(i);
+        const auto own = spokes.at(i);
         const auto spoke = std::find_if(
-            near.begin(), near.end(), [&](const Spoke& each) { return each.to == entry.particle; });
-        if (spoke == near.end())
+            own.begin(), own.end(), [&](const Spoke& each) { return each.to == entry.particle; });
+        if (spoke == own.end())
           far[index(i)].push_back(entry);
         else if (i < entry.particle)
           bend[index(spoke->triangle)][spoke->edge] = entry.stiffness;
@@ -242,9 +254,7 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
   const auto reaches = [&](int i) { return (far[index(i)].size() + 3) / 4; };
 
   // order: in windows, so that loops over neighbours run equally often
-  std::vector<int> order = near_order(particles, mesh.triangles);
-  std::vector<std::vector<int>> near(index(particles));
-  for (int i = 0; i < particles; ++i) near[index(i)] = neighbours(spokes, i);
+  std::vector<int> order = near_order(near);
   const auto loops = [&](int i) { return std::pair(near[index(i)].size(), reaches(i)); };
   for (std::size_t begin = 0; begin < order.size(); begin += index(kBlock))
     std::stable_sort(
@@ -256,10 +266,10 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
   const auto offset = [&](int i) { return static_cast<Offset>(4 * law.place[index(i)]); };
 
   // triangles, in order of their first particle
-  std::vector<int> triangles(mesh.triangles.size());
+  std::vector<int> triangles(corners.size());
   std::iota(triangles.begin(), triangles.end(), 0);
   const auto first = [&](int t) {
-    const auto& [a, b, c] = mesh.triangles[index(t)];
+    const auto& [a, b, c] = corners[index(t)];
     return std::min({offset(a), offset(b), offset(c)});
   };
   std::stable_sort(triangles.begin(), triangles.end(),
@@ -274,7 +284,7 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
     const std::size_t group = at / index(kLanes), lane = at % index(kLanes);
     slot[t] = static_cast<int>(at);
     for (std::size_t k = 0; k < 3; ++k)
-      law.corners.data()[(group * 3 + k) * index(kLanes) + lane] = offset(mesh.triangles[t][k]);
+      law.corners.data()[(group * 3 + k) * index(kLanes) + lane] = offset(corners[t][k]);
     T* const constants = law.stiffness.data() + group * index(law.constants() * kLanes) + lane;
     if (t < surface.membrane.size()) {
       const MembraneElement& element = surface.membrane[t];
@@ -324,7 +334,7 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
     gather.reaches = static_cast<std::uint32_t>(reaches(i));
     if (!blows) continue;
     for (const Spoke& spoke : spokes.at(i)) {
-      const auto& corner = mesh.triangles[index(spoke.triangle)];
+      const auto& corner = corners[index(spoke.triangle)];
       if (corner[index((spoke.edge + 1) % 3)] != i) continue;  // once of each triangle
       law.blown.data()[blown++] = static_cast<Offset>(4 * slot[index(spoke.triangle)]);
       ++gather.corners;

@@ -80,8 +80,7 @@ struct TriangleLaw {
 template <class T>
 TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows);
 
-// Particles in an order that keeps neighbours near: which one is where. Those of a window of
-// kBlock have so many sides and reaches, in ascending order, that branches are foreseen.
-std::vector<int> near_order(int particles, const std::vector<std::array<int, 3>>& triangles);
+// Particles in an order that keeps neighbours near.
+std::vector<int> near_order(const std::vector<std::vector<int>>& neighbours);
 
 }  // namespace weft

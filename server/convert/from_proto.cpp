@@ -6,6 +6,7 @@
 #include <set>
 
 #include "server/convert/convert.h"
+#include "server/convert/mesh.h"
 #include "server/textiles/catalogue.h"
 
 namespace weft {
@@ -90,6 +91,7 @@ class Reader {
   }
 
   SheetDefinition sheet(const v1::Sheet& from, const std::string& field);
+  void set_shape(const v1::Sheet& from, const std::string& field, SheetDefinition& sheet);
   BendingLaw bending(const v1::BendingLaw& from, const std::string& field);
   MeasuredTextile preset(const std::string& name, const std::string& field);
   Collider collider(const v1::Collider& from, const std::string& field);
@@ -124,17 +126,15 @@ Scene Reader::scene(const v1::Scene& from) {
 
 SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
   SheetDefinition sheet;
-  sheet.shape = Grid{from.grid().rows(), from.grid().columns(), from.grid().spacing_m()};
-  if (from.has_triangles() && mesh(from.triangles(), field + ".triangles"))
-    problem(field + ".triangles", "cannot be simulated yet");
-  if (!from.has_grid()) missing(field + ".mesh", "grid", field + ".grid.");
+  set_shape(from, field, sheet);
   if (from.has_textile()) {
     sheet.textile = textile(from.textile(), field + ".textile");
   } else {
     missing(field + ".textile", "a textile", field + ".textile.");
   }
-  sheet.bending =
-      from.has_bending() ? bending(from.bending(), field + ".bending") : default_bending(accuracy_);
+  sheet.bending = from.has_bending()     ? bending(from.bending(), field + ".bending")
+                  : from.has_triangles() ? Isometric{}
+                                         : default_bending(accuracy_);
   sheet.origin = vector(from.placement().origin_m());
   sheet.rotation = rotation(from.placement());
   sheet.start_positions = {from.start_positions_m().begin(), from.start_positions_m().end()};
@@ -145,6 +145,31 @@ SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
   }
   if (from.has_skin_m()) sheet.skin = from.skin_m();
   return sheet;
+}
+
+void Reader::set_shape(const v1::Sheet& from, const std::string& field, SheetDefinition& sheet) {
+  sheet.shape = Grid{from.grid().rows(), from.grid().columns(), from.grid().spacing_m()};
+  if (from.has_grid()) return;
+  if (!from.has_triangles()) return missing(field + ".mesh", "grid or triangles", field + ".grid.");
+  // a grid stands in for what is faulty
+  for (const char* each : {".grid.", ".start_", ".pins", ".bending", ".textile.raw"})
+    stand_ins_.push_back(field + each);
+  const auto data = mesh(from.triangles(), field + ".triangles");
+  if (!data) return;
+  const std::string path =
+      field + (from.triangles().has_data() ? ".triangles.data" : ".triangles.asset");
+  auto made = to_mesh(*data, path);
+  if (auto* problems = std::get_if<std::vector<Problem>>(&made)) {
+    std::move(problems->begin(), problems->end(), std::back_inserter(problems_));
+    return;
+  }
+  stand_ins_.resize(stand_ins_.size() - 5);
+  sheet.shape = std::get<Triangles>(std::move(made));
+  if (from.triangles().has_asset()) sheet.asset = from.triangles().asset();
+  for (int p = 0; p < data->panels_size(); ++p)
+    if (data->panels(p).has_textile())
+      sheet.panel_textiles.push_back(
+          {p, textile(data->panels(p).textile(), at(path + ".panels", p) + ".textile")});
 }
 
 // nullptr where there is none, which is said.

@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
-#include <map>
-#include <set>
+#include <vector>
 
+#include "core/model/mesh_problems.h"
 #include "core/model/text.h"
 
 namespace weft {
@@ -26,99 +26,30 @@ std::vector<Value> values_of(const std::string& bytes) {
   return values;
 }
 
+template <class Value>
+std::string bytes_of(const std::vector<Value>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Value)};
+}
+
 // Corners of the flat shape, or 0 where it has none of its own.
 std::size_t corners_of(const v1::MeshData& mesh) { return mesh.flat_m().size() / 8; }
 
-// Collects what is wrong with the arrays of a mesh.
-class Check {
- public:
-  Check(const v1::MeshData& mesh, const std::string& field) : mesh_(mesh), field_(field) {
-    const auto particles = static_cast<std::size_t>(particles_of(mesh));
-    plane(mesh.positions_m(), "positions_m", 12);
-    plane(mesh.flat_m(), "flat_m", 8);
-    if (mesh.positions_m().empty() && mesh.flat_m().empty())
-      problem("positions_m", "is absent, and so is flat_m; give one or both");
-    indices(mesh.triangles(), "triangles", particles, "particles");
-    if (!mesh.flat_triangles().empty()) {
-      indices(mesh.flat_triangles(), "flat_triangles", corners_of(mesh),
-              "corners of the flat shape");
-      if (mesh.flat_triangles().size() != mesh.triangles().size())
-        problem("flat_triangles",
-                join("has ", mesh.flat_triangles().size(), " bytes; as many as triangles, ",
-                     mesh.triangles().size(), ", or none are needed"));
-    } else if (!mesh.flat_m().empty() && corners_of(mesh) != particles) {
-      problem("flat_m", join("has ", corners_of(mesh), " corners for ", particles,
-                             " particles; give flat_triangles, or as many"));
-    }
-    panels();
-  }
+// Points in planes of float32.
+template <class Point>
+std::vector<Point> points_of(const std::string& bytes) {
+  const auto values = values_of<float>(bytes);
+  const std::size_t axes = Point::RowsAtCompileTime, count = values.size() / axes;
+  std::vector<Point> points(count);
+  for (std::size_t axis = 0; axis < axes; ++axis)
+    for (std::size_t i = 0; i < count; ++i)
+      points[i][static_cast<Eigen::Index>(axis)] = double{values[axis * count + i]};
+  return points;
+}
 
-  std::vector<Problem> problems;
-
- private:
-  void problem(const std::string& part, const std::string& message) {
-    problems.push_back({field_ + "." + part, message});
-  }
-
-  // Values in planes of float32, so many bytes for each point.
-  void plane(const std::string& bytes, const char* part, std::size_t size) {
-    constexpr float kMost = 1e4F;  // m
-    if (bytes.size() % size != 0)
-      return problem(part, join("has ", bytes.size(), " bytes, no multiple of ", size));
-    const auto values = values_of<float>(bytes);
-    const auto bad = std::find_if(values.begin(), values.end(),
-                                  [&](float value) { return !(std::abs(value) <= kMost); });
-    if (bad != values.end()) {
-      const auto points = values.size() * sizeof(float) / size;
-      problem(part,
-              join(*bad, " m of point ", static_cast<std::size_t>(bad - values.begin()) % points,
-                   " is not within -10000 to 10000 m"));
-    }
-  }
-
-  void indices(const std::string& bytes, const char* part, std::size_t count, const char* what) {
-    if (bytes.empty()) return problem(part, "is absent; give one triangle or more");
-    if (bytes.size() % sizeof(Triangle) != 0)
-      return problem(part, join("has ", bytes.size(), " bytes, no multiple of 12"));
-    const auto triangles = values_of<Triangle>(bytes);
-    for (std::size_t i = 0; i < triangles.size(); ++i) {
-      const auto& [a, b, c] = triangles[i];
-      const std::uint32_t largest = std::max({a, b, c});
-      if (largest >= count)
-        return problem(
-            part, join("triangle ", i, " names ", largest, ", but there are ", count, " ", what));
-      if (a == b || b == c || c == a)
-        return problem(part, join("triangle ", i, " has the same corner twice"));
-    }
-  }
-
-  void panels() {
-    const auto triangles = static_cast<std::int64_t>(mesh_.triangles().size() / sizeof(Triangle));
-    std::int64_t sum = 0;
-    std::set<std::string> names;
-    for (int i = 0; i < mesh_.panels_size(); ++i) {
-      const v1::Panel& panel = mesh_.panels(i);
-      const std::string part = "panels[" + std::to_string(i) + "].";
-      const bool named = !panel.name().empty() && panel.name().size() <= 63 &&
-                         panel.name().find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") ==
-                             std::string::npos;
-      if (!named)
-        problem(part + "name", "\"" + panel.name() + "\" is not 1 to 63 characters of [a-z0-9_-]");
-      if (named && !names.insert(panel.name()).second)
-        problem(part + "name", "\"" + panel.name() + "\" is another panel's, too");
-      if (panel.triangle_count() < 1)
-        problem(part + "triangle_count", std::to_string(panel.triangle_count()) + " is below 1");
-      if (!(std::abs(panel.grain_rad()) <= 7))
-        problem(part + "grain_rad", join(panel.grain_rad(), " rad is not within -7 to 7 rad"));
-      sum += panel.triangle_count();
-    }
-    if (mesh_.panels_size() > 0 && sum != triangles)
-      problem("panels", join("have ", sum, " triangles together; the mesh has ", triangles));
-  }
-
-  const v1::MeshData& mesh_;
-  const std::string field_;
-};
+// Indices that no int holds are negative: out of range.
+std::vector<std::array<int, 3>> triangles_of(const std::string& bytes) {
+  return values_of<std::array<int, 3>>(bytes);
+}
 
 struct Edges {
   std::int32_t border = 0, branching = 0;
@@ -174,8 +105,60 @@ std::array<std::array<double, 3>, 3> corners(const v1::MeshData& mesh, const Tri
 
 }  // namespace
 
-std::vector<Problem> find_problems(const v1::MeshData& mesh, const std::string& field) {
-  return std::move(Check(mesh, field).problems);
+Converted<Triangles> to_mesh(const v1::MeshData& from, const std::string& field) {
+  std::vector<Problem> problems;
+  const auto check = [&](const char* name, const std::string& bytes, std::size_t size) {
+    if (bytes.size() % size != 0)
+      problems.push_back({join(field, ".", name),
+                          join("has ", bytes.size(), " bytes, which is no multiple of ", size)});
+  };
+  check("positions_m", from.positions_m(), 12);
+  check("triangles", from.triangles(), sizeof(Triangle));
+  check("flat_m", from.flat_m(), 8);
+  check("flat_triangles", from.flat_triangles(), sizeof(Triangle));
+  if (from.positions_m().empty() && (from.flat_m().empty() || !from.flat_triangles().empty()))
+    problems.push_back({field + ".positions_m",
+                        "is absent; give positions, or a flat shape of which every corner is a "
+                        "particle"});
+  if (!problems.empty()) return problems;
+
+  TriangleMesh mesh;
+  mesh.start = points_of<Vector3d>(from.positions_m());
+  mesh.triangles = triangles_of(from.triangles());
+  mesh.flat = points_of<Vector2d>(from.flat_m());
+  mesh.flat_triangles = triangles_of(from.flat_triangles());
+  for (const v1::Panel& panel : from.panels())
+    mesh.panels.push_back({panel.name(), panel.triangle_count(), panel.grain_rad()});
+  Triangles made = complete(std::move(mesh));
+  problems = find_problems(*made, field);
+  if (problems.empty()) return made;
+  return problems;
+}
+
+v1::MeshData topology_of(const SheetShape& shape) {
+  v1::MeshData to;
+  to.set_triangles(bytes_of(triangles_of(shape)));
+  std::vector<Vector2d> flat;
+  if (const auto* mesh = std::get_if<Triangles>(&shape)) {
+    flat = (*mesh)->flat;
+    to.set_flat_triangles(bytes_of((*mesh)->flat_triangles));
+    for (const Panel& panel : (*mesh)->panels) {
+      v1::Panel* added = to.add_panels();
+      added->set_name(panel.name);
+      added->set_triangle_count(panel.triangles);
+      added->set_grain_rad(panel.grain);
+    }
+  } else {
+    for (int i = 0; i < particle_count(shape); ++i) {
+      const Vector3d at = local_position(shape, i);
+      flat.emplace_back(at.z(), at.x());
+    }
+  }
+  std::vector<float> planes;
+  for (const Eigen::Index axis : {0, 1})
+    for (const Vector2d& corner : flat) planes.push_back(static_cast<float>(corner[axis]));
+  to.set_flat_m(bytes_of(planes));
+  return to;
 }
 
 std::int64_t particles_of(const v1::MeshData& mesh) {

@@ -4,18 +4,22 @@
 #include <vector>
 
 #include "core/model/scene.h"
+#include "server/convert/convert.h"
 #include "weft/v1/asset.pb.h"
 #include "weft/v1/mesh.pb.h"
 
 namespace weft {
 
-// Everything that keeps a mesh from being used. Paths begin with `field`.
-std::vector<Problem> find_problems(const v1::MeshData& mesh, const std::string& field);
+// A mesh that can be simulated, or everything that is wrong with it. Paths begin with `field`.
+Converted<Triangles> to_mesh(const v1::MeshData& mesh, const std::string& field);
+
+// Triangles, flat shape and panels of a sheet, without positions.
+v1::MeshData topology_of(const SheetShape& shape);
 
 // Particles of a mesh, whatever else is wrong with it.
 std::int64_t particles_of(const v1::MeshData& mesh);
 
-// Precondition: find_problems has nothing to say of it.
+// Precondition: to_mesh() takes it.
 v1::MeshFacts facts_of(const v1::MeshData& mesh);
 
 }  // namespace weft

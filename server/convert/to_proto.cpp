@@ -93,7 +93,10 @@ void set(v1::Sheet* to, const Grid& grid) {
 void set(v1::Sheet* to, const SheetDefinition& from, const Textile& textile,
          StartValues start_values) {
   to->set_name(from.name);
-  std::visit([&](const auto& shape) { set(to, shape); }, from.shape);
+  if (const auto* grid = std::get_if<Grid>(&from.shape))
+    set(to, *grid);
+  else
+    to->mutable_triangles()->set_asset(from.asset);
   *to->mutable_textile() = to_proto(textile);
   std::visit([&](const auto& law) { set(to->mutable_bending(), law); }, from.bending);
   set(to->mutable_placement()->mutable_origin_m(), from.origin);

@@ -21,8 +21,9 @@ std::variant<v1::MeshFacts, grpc::Status> look_at(const KeptAsset& asset,
   v1::MeshData mesh;
   if (!mesh.ParseFromString(bytes))
     return errors::field_invalid("data", "the bytes are no weft.v1.MeshData");
-  if (const auto problems = find_problems(mesh, "data"); !problems.empty())
-    return errors::field_invalid(problems);
+  const auto made = to_mesh(mesh, "data");
+  if (const auto* problems = std::get_if<std::vector<Problem>>(&made))
+    return errors::field_invalid(*problems);
   return facts_of(mesh);
 }
 
@@ -91,7 +92,9 @@ grpc::Status finish_asset(Backend& backend, KeptAsset& asset) {
     count_assets(backend);
     return *error;
   }
-  asset.create_time = std::chrono::system_clock::now();
+  // as exactly as it is kept
+  asset.create_time =
+      std::chrono::floor<std::chrono::microseconds>(std::chrono::system_clock::now());
   asset.facts = std::get<v1::MeshFacts>(found).SerializeAsString();
   assets.finish(asset, asset.facts, *asset.create_time);
   return grpc::Status::OK;

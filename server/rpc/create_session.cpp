@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "server/convert/convert.h"
+#include "server/convert/mesh.h"
 #include "server/convert/names.h"
 #include "server/convert/numerics.h"
 #include "server/rpc/assets.h"
@@ -19,7 +20,7 @@ namespace {
 // So many particles are planned within a tenth of a second.
 constexpr std::int64_t kLarge = 4096;
 
-// Without sheets that are larger than any that is simulated.
+// Without sheets that are larger than any that is simulated, and those whose mesh is an asset.
 std::int64_t particles_of(const v1::Scene& scene) {
   constexpr std::int64_t kMostRows = 4096;
   std::int64_t particles = 0;
@@ -27,7 +28,14 @@ std::int64_t particles_of(const v1::Scene& scene) {
     const std::int64_t rows = sheet.grid().rows(), columns = sheet.grid().columns();
     if (std::min(rows, columns) > 0 && std::max(rows, columns) <= kMostRows)
       particles += rows * columns;
+    particles += weft::particles_of(sheet.triangles().data());
   }
+  return particles;
+}
+
+std::int64_t particles_of(const Scene& scene) {
+  std::int64_t particles = 0;
+  for (const SheetDefinition& sheet : scene.sheets) particles += sheet.particle_count();
   return particles;
 }
 
@@ -166,7 +174,7 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
   }
   Scene& scene = std::get<Scene>(converted);
   const auto fresh = name_meshes(request.session().scene(), scene);
-  const std::int64_t particles = particles_of(request.session().scene());
+  const std::int64_t particles = particles_of(scene);
   if (particles > backend_.limits.max_particles_per_session) {
     return errors::exhausted("particles_per_session",
                              "the scene has " + std::to_string(particles) +

@@ -9,6 +9,7 @@
 #include "server/rpc/errors.h"
 #include "server/rpc/frame_streams.h"
 #include "server/rpc/server_service.h"
+#include "server/rpc/topology.h"
 
 namespace weft {
 
@@ -17,16 +18,8 @@ using Streamed = v1::StreamFramesResponse;
 using Viewed = v1::ViewFramesResponse;
 static_assert(int{Viewed::kHeaderFieldNumber} == int{Streamed::kHeaderFieldNumber} &&
               int{Viewed::kFrameFieldNumber} == int{Streamed::kFrameFieldNumber} &&
-              int{Viewed::kProgressFieldNumber} == int{Streamed::kProgressFieldNumber});
-
-namespace {
-
-void set(v1::SheetLayout* to, const Grid& grid) {
-  to->set_rows(grid.rows);
-  to->set_columns(grid.columns);
-}
-
-}  // namespace
+              int{Viewed::kProgressFieldNumber} == int{Streamed::kProgressFieldNumber} &&
+              int{Viewed::kTopologyFieldNumber} == int{Streamed::kTopologyFieldNumber});
 
 bool FrameCall::begin(const grpc::ServerContextBase& context) {
   self_ = shared_from_this();
@@ -124,6 +117,7 @@ void FrameCall::on_done() {
 void FrameCall::read_on(Clock::duration silence) {
   if (writing_ || finished_) return;
   if (ending_) return finish(*ending_);
+  if (!topology_.empty()) return write_topology();
   if (!parts_.empty()) return write_part();
   if (do_first() || !subscription_) return;
   const Reading reading = subscription_->read(wants_frame());
@@ -162,6 +156,13 @@ void FrameCall::write_part() {
   write(part);
 }
 
+void FrameCall::write_topology() {
+  const grpc::ByteBuffer part = topology_.front();
+  topology_.erase(topology_.begin());
+  backend_.stats.bytes_sent += static_cast<std::int64_t>(part.Length());
+  write(part);
+}
+
 void FrameCall::write(const grpc::ByteBuffer& message) {
   message_ = message;  // shares the bytes
   writing_ = true;
@@ -181,11 +182,18 @@ void FrameCall::write_header() {
     v1::SheetLayout* layout = header->add_sheets();
     layout->set_name(sheet.name);
     layout->set_first_particle(first_particle);
-    std::visit([&](const auto& shape) { set(layout, shape); }, sheet.shape);
+    if (const auto* grid = std::get_if<Grid>(&sheet.shape)) {
+      layout->set_rows(grid->rows);
+      layout->set_columns(grid->columns);
+    }
+    layout->set_particle_count(sheet.particle_count());
+    layout->set_triangle_count(triangle_count(sheet.shape));
     first_particle += sheet.particle_count();
   }
   *header->mutable_format() = order_.format;
   header->set_start_frame(subscription_->next_frame());
+  if (order_.format.topology())
+    topology_ = encoded_topology(order_.sheets, backend_.limits.max_frame_bytes);
   write(encoded(message));
 }
 

@@ -75,6 +75,7 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   grpc::Status take(const FoundSession& found, const std::string& uid,
                     std::vector<Problem> problems);
   void write_progress(const Progress& progress);
+  void write_topology();
   void write_part();
 
   Backend& backend_;
@@ -90,8 +91,9 @@ class FrameCall : public FrameSink, public std::enable_shared_from_this<FrameCal
   grpc::ByteBuffer message_;  // in flight
   bool writing_ = false;
   bool finished_ = false;
-  std::optional<grpc::Status> ending_;   // as soon as nothing is in flight
-  std::vector<grpc::ByteBuffer> parts_;  // of frame_, still to be written
+  std::optional<grpc::Status> ending_;      // as soon as nothing is in flight
+  std::vector<grpc::ByteBuffer> topology_;  // after the header, still to be written
+  std::vector<grpc::ByteBuffer> parts_;     // of frame_, still to be written
   std::int64_t frame_ = 0;
   std::optional<std::int64_t> last_frame_;  // of which no part is left
   std::uint64_t state_changes_ = 0;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/model/normals.h"
+#include "core/model/strain.h"
 #include "core/model/text.h"
 #include "server/rpc/bytes.h"
 
@@ -115,7 +116,8 @@ std::vector<v1::Frame> in_parts(v1::Frame frame, std::int64_t most_bytes) {
   constexpr std::size_t kRest = 256;  // number, time, stats, tags and lengths
   const auto room = static_cast<std::size_t>(most_bytes) - kRest;
   std::vector<v1::Frame> parts;
-  if (frame.positions_m().size() + frame.velocities_m_per_s().size() + frame.normals().size() <=
+  if (frame.positions_m().size() + frame.velocities_m_per_s().size() + frame.normals().size() +
+          frame.strain().size() <=
       room) {
     parts.push_back(std::move(frame));
     return parts;
@@ -125,7 +127,9 @@ std::vector<v1::Frame> in_parts(v1::Frame frame, std::int64_t most_bytes) {
   const std::string normals = std::move(*frame.mutable_normals());
   frame.clear_positions_m();
   frame.clear_velocities_m_per_s();
+  const std::string strain = std::move(*frame.mutable_strain());
   frame.clear_normals();
+  frame.clear_strain();
   parts.push_back(frame);
   std::size_t left = room;
   const auto append = [&](const std::string& array, auto field) {
@@ -144,6 +148,7 @@ std::vector<v1::Frame> in_parts(v1::Frame frame, std::int64_t most_bytes) {
   append(positions, &v1::Frame::mutable_positions_m);
   append(velocities, &v1::Frame::mutable_velocities_m_per_s);
   append(normals, &v1::Frame::mutable_normals);
+  append(strain, &v1::Frame::mutable_strain);
   return parts;
 }
 
@@ -196,6 +201,8 @@ std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order) {
   if (format.velocities()) message.set_velocities_m_per_s(array_of(frame.velocities, format));
   if (format.normals())
     message.set_normals(array_of(normals_of(frame.positions, order.sheets), format));
+  if (format.strain())
+    message.set_strain(bytes_of(strains_of(frame.positions, order.sheets), format));
   if (format.stats()) {
     v1::FrameStats* stats = message.mutable_stats();
     stats->set_kinetic_energy_j(frame.stats.kinetic_energy);

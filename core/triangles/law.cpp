@@ -308,7 +308,7 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
     corner_count += blows ? spokes.at(i).size() / 2 : 0;
   }
   law.blocks.resize(index((particles + kBlock - 1) / kBlock));
-  law.gathers = AlignedArray<Gather>(law.blocks.size() * index(kBlock));
+  law.gathers = AlignedArray<Gather<T>>(law.blocks.size() * index(kBlock));
   law.sides = AlignedArray<Side>(side_count);
   law.reaches = AlignedArray<Reach<T>>(reach_count);
   law.blown = AlignedArray<Offset>(corner_count);
@@ -316,7 +316,7 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
   for (std::size_t k = 0; k < order.size(); ++k) {
     const int i = order[k];
     if (k % index(kBlock) == 0) law.blocks[k / index(kBlock)] = {side, reach, blown};
-    Gather& gather = law.gathers.data()[k];
+    Gather<T>& gather = law.gathers.data()[k];
     for (const int j : near[index(i)]) {
       Side& made = law.sides.data()[side++] = {offset(j), {none, none}};
       std::size_t found = 0;
@@ -327,8 +327,14 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
       }
       ++gather.sides;
     }
-    for (const Entry& entry : far[index(i)])
-      law.reaches.data()[reach++] = {offset(entry.particle), static_cast<T>(entry.stiffness)};
+    double sum = 0;
+    for (const Entry& entry : far[index(i)]) {
+      const T stiffness = static_cast<T>(entry.stiffness);
+      law.reaches.data()[reach++] = {offset(entry.particle), stiffness};
+      sum += double{stiffness};
+    }
+    gather.reach_sum = static_cast<T>(sum);
+    gather.reach_error = static_cast<T>(double{gather.reach_sum} - sum);
     for (std::size_t n = far[index(i)].size(); n < 4 * reaches(i); ++n)
       law.reaches.data()[reach++] = {offset(i), T(0)};
     gather.reaches = static_cast<std::uint32_t>(reaches(i));

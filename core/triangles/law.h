@@ -26,10 +26,12 @@ struct Reach {
 };
 
 // How forces on a particle are added up, in this order.
+template <class T>
 struct Gather {
   std::uint32_t sides = 0;
-  std::uint32_t reaches = 0;  // in fours; what is missing reaches to itself
-  std::uint32_t corners = 0;  // of triangles that wind presses on
+  std::uint32_t reaches = 0;         // in fours; what is missing reaches to itself
+  std::uint32_t corners = 0;         // of triangles that wind presses on
+  T reach_sum = 0, reach_error = 0;  // of stiffness, N/m, and what rounding has added to it
 };
 
 // What one substep does to a sheet of triangles. With l the lengths of its edges and L those in the
@@ -53,7 +55,7 @@ struct TriangleLaw {
   AlignedArray<T> stiffness;  // (groups x constants() x kLanes)
   int constants() const { return pushes ? 9 : 15; }
 
-  AlignedArray<Gather> gathers;  // of each particle
+  AlignedArray<Gather<T>> gathers;  // of each particle
   AlignedArray<Side> sides;
   AlignedArray<Reach<T>> reaches;
   AlignedArray<Offset> blown;  // of triangles

@@ -156,7 +156,7 @@ HWY_INLINE void gather_block(const TriangleLaw<T>& law, const TriangleState<T>& 
   const T *const x = state.x.data(), *const w = state.w.data();
   const T *const tension = state.tension.data(), *const wind = state.wind.data();
   const auto& from = law.blocks[block];
-  const Gather* gather = law.gathers.data() + block * kBlock;
+  const Gather<T>* gather = law.gathers.data() + block * kBlock;
   const Side* side = law.sides.data() + from.side;
   const Reach<T>* reach = law.reaches.data() + from.reach;
   const Offset* blown = law.blown.data() + from.blown;
@@ -175,11 +175,13 @@ HWY_INLINE void gather_block(const TriangleLaw<T>& law, const TriangleState<T>& 
     if constexpr (kBends) {
       Q even = Q::zero(), odd = Q::zero();
       for (std::uint32_t k = 0; k < gather->reaches; ++k, reach += 4) {
-        even.subtract(reach[0].stiffness, Q::apart(x + reach[0].particle, here));
-        odd.subtract(reach[1].stiffness, Q::apart(x + reach[1].particle, here));
-        even.subtract(reach[2].stiffness, Q::apart(x + reach[2].particle, here));
-        odd.subtract(reach[3].stiffness, Q::apart(x + reach[3].particle, here));
+        even.subtract(reach[0].stiffness, Q::load(x + reach[0].particle));
+        odd.subtract(reach[1].stiffness, Q::load(x + reach[1].particle));
+        even.subtract(reach[2].stiffness, Q::load(x + reach[2].particle));
+        odd.subtract(reach[3].stiffness, Q::load(x + reach[3].particle));
       }
+      even.add(gather->reach_sum, here);
+      odd.subtract(gather->reach_error, here);
       even.add(odd);
       pull.add(even);
     }

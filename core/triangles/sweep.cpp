@@ -57,6 +57,13 @@ HWY_INLINE Triple<hn::Vec<D>> pick(D d, const hn::TFromD<D>* p, const Offset* at
 
 #endif
 
+// Asks for what is read so many bytes from here on, `lines` lines of the cache.
+template <int kLines, class A>
+HWY_INLINE void fetch(const A* from, std::ptrdiff_t ahead) {
+  for (int k = 0; k < kLines; ++k)
+    __builtin_prefetch(reinterpret_cast<const char*>(from) + ahead + 64 * k, 0, 2);
+}
+
 // Tensions, and what wind does, of the groups of triangles first ... last - 1.
 template <bool kPushes, bool kBlows, class T>
 void strain_groups(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last) {
@@ -71,6 +78,10 @@ void strain_groups(const TriangleLaw<T>& law, TriangleState<T>& state, int first
       const Offset* const at = law.corners.data() + group * 3 * kLanes + part;
       const T* const constants = law.stiffness.data() + group * kConstants * kLanes + part;
       T* const tensions = state.tension.data() + group * 3 * kLanes + part;
+      if (part == 0) {
+        fetch<kConstants>(constants, 2 * kConstants * 64);
+        fetch<3>(at, 2 * 3 * 64);
+      }
       const auto c = [&](int k) HWY_ATTR { return hn::Load(d, constants + k * kLanes); };
       const auto put = [&](int k, V v) HWY_ATTR { hn::Store(v, d, tensions + k * kLanes); };
 
@@ -161,6 +172,8 @@ HWY_INLINE void gather_block(const TriangleLaw<T>& law, const TriangleState<T>& 
   const Reach<T>* reach = law.reaches.data() + from.reach;
   const Offset* blown = law.blown.data() + from.blown;
   for (std::size_t i = 4 * block * kBlock; i < 4 * (block + 1) * kBlock; i += 4, ++gather) {
+    fetch<2>(side, 1024);
+    if constexpr (kBends) fetch<3>(reach, 2048);
     const Q here = Q::load(x + i);
     Q pull = Q::zero(), speed = Q::zero();
 

@@ -12,6 +12,10 @@ enum class Cut { kRight, kAlternating, kEquilateral, kIrregular };
 // A square of that width, m; of kEquilateral as near to it as rows fit.
 RestShape square(Cut cut, double width, double spacing);
 
+// A square of so many points along each side, scattered and joined as Delaunay does: of any
+// valence.
+RestShape scattered(int columns, double spacing);
+
 // From particles' (u, v), one each.
 RestShape rest_shape(const std::vector<Vector2d>& points,
                      const std::vector<std::array<int, 3>>& triangles);

@@ -33,18 +33,28 @@ class Fans {
   const Fan& at(int i) const { return fans_[static_cast<std::size_t>(i)]; }
   const Corners& corners() const { return corners_; }
 
-  // With the neighbours of its neighbours.
-  std::vector<Neighbour> widened(int i) const {
-    const auto known = [&](const std::vector<Neighbour>& ring, int k) {
-      return std::any_of(ring.begin(), ring.end(),
-                         [&](const Neighbour& each) { return each.particle == k; });
-    };
-    std::vector<Neighbour> wide = at(i).ring;
-    for (const auto& [j, offset] : at(i).ring) {
+  // With those neighbours of its neighbours that at least so many of them have.
+  std::vector<Neighbour> widened(int i, int least) const {
+    const std::vector<Neighbour>& ring = at(i).ring;
+    std::vector<Neighbour> wide = ring;
+    std::vector<int> times(ring.size(), least);
+    for (const auto& [j, offset] : ring) {
       const Plane2 turn = turn_between(i, j);
-      for (const auto& [k, further] : at(j).ring)
-        if (k != i && !known(wide, k)) wide.push_back({k, offset + turn * further});
+      for (const auto& [k, further] : at(j).ring) {
+        if (k == i) continue;
+        std::size_t known = 0;
+        while (known < wide.size() && wide[known].particle != k) ++known;
+        if (known == wide.size()) {
+          wide.push_back({k, offset + turn * further});
+          times.push_back(0);
+        }
+        ++times[known];
+      }
     }
+    std::size_t kept = 0;
+    for (std::size_t n = 0; n < wide.size(); ++n)
+      if (times[n] >= least) wide[kept++] = wide[n];
+    wide.resize(kept);
     return wide;
   }
 
@@ -202,8 +212,10 @@ std::vector<CurvatureFit> fit_curvature(const RestShape& shape) {
   std::vector<CurvatureFit> fits;
   fits.reserve(static_cast<std::size_t>(shape.particles));
   for (int i = 0; i < shape.particles; ++i) {
-    const bool narrow = on_border[static_cast<std::size_t>(i)] || fans.at(i).ring.size() < kEnough;
-    const std::vector<Neighbour> near = narrow ? fans.widened(i) : fans.at(i).ring;
+    const bool full = fans.at(i).ring.size() >= kEnough;
+    const std::vector<Neighbour> near = on_border[static_cast<std::size_t>(i)] ? fans.widened(i, 1)
+                                        : full                                 ? fans.at(i).ring
+                                                                               : fans.widened(i, 2);
     const Eigen::Matrix3Xd weights = quadratic(near);
     for (const Share& share : shares(shape, fans, i))
       fits.push_back(fit_along(i, near, weights, share));

@@ -24,7 +24,7 @@ void name_call(google::protobuf::Message& request);
 // another one has it, which one that is (weft-replica), for a load balancer to go by. An attempt
 // that was refused as WRONG_REPLICA is followed by another; so is one that met a server that is
 // draining or cannot ask its database, or that ended on the road, as far as sending it again does
-// no harm: it only reads, or has a request_id.
+// no harm: it only reads, has a request_id, or brings an asset.
 class Attempts {
  public:
   // Of a call, or of a stream that begins with this request. Where a server was draining, patience

@@ -190,7 +190,7 @@ Connection::Connection(std::shared_ptr<Embedded> server, std::shared_ptr<const D
       channel_(std::move(channel)),
       stubs_(v1::SessionService::NewStub(channel_), v1::FrameService::NewStub(channel_),
              v1::TextileService::NewStub(channel_), v1::ServerService::NewStub(channel_),
-             v1::LabService::NewStub(channel_)) {}
+             v1::LabService::NewStub(channel_), v1::AssetService::NewStub(channel_)) {}
 
 Connection::~Connection() = default;
 

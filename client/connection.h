@@ -11,6 +11,7 @@
 
 #include "client/attempts.h"
 #include "client/problem.h"
+#include "weft/v1/asset.grpc.pb.h"
 #include "weft/v1/frame.grpc.pb.h"
 #include "weft/v1/lab.grpc.pb.h"
 #include "weft/v1/server.grpc.pb.h"
@@ -80,6 +81,9 @@ class Connection {
     return *std::get<std::unique_ptr<v1::FrameService::Stub>>(stubs_);
   }
   v1::LabService::Stub& lab() { return *std::get<std::unique_ptr<v1::LabService::Stub>>(stubs_); }
+  v1::AssetService::Stub& assets() {
+    return *std::get<std::unique_ptr<v1::AssetService::Stub>>(stubs_);
+  }
   const std::stop_token& stop() const { return stop_; }
 
   // Waits until the server can be reached, at most so long. Between calls nobody works on that.
@@ -106,7 +110,7 @@ class Connection {
   std::shared_ptr<grpc::Channel> channel_;
   std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,
              std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>,
-             std::unique_ptr<v1::LabService::Stub>>
+             std::unique_ptr<v1::LabService::Stub>, std::unique_ptr<v1::AssetService::Stub>>
       stubs_;
 };
 

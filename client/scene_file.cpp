@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "client/assets.h"
+#include "client/imports/import.h"
 #include "client/input_file.h"
 #include "client/json_file.h"
 #include "client/output/json.h"
@@ -19,13 +21,17 @@ std::string place_in_file(std::string field) {
 
 // What people take for a scene: where cloth is drawn, not simulated.
 void refuse_mesh(const std::string& path) {
+  if (is_mesh_file(path))
+    throw malformed(path, fmt::format("is a mesh, not a scene file; `weft scene new --mesh {} -o "
+                                      "scene.json` makes one of it, and says what it found",
+                                      path));
   for (const char* ending :
-       {".obj", ".gltf", ".glb", ".fbx", ".stl", ".ply", ".usd", ".usda", ".usdc", ".dxf", ".abc"})
+       {".fbx", ".stl", ".ply", ".usd", ".usda", ".usdc", ".dxf", ".abc", ".dae", ".blend"})
     if (path.ends_with(ending))
-      throw malformed(path,
-                      "is a mesh, not a scene file. Sheets are rectangular grids; `weft scene new "
-                      "--template box --spacing 0.01 -o scene.json` writes a scene of one, and its "
-                      "start_positions_m may give the points of such a mesh");
+      throw malformed(
+          path,
+          "is a mesh, not a scene file, and of a format that weft does not read: export "
+          "it as .obj or .glb with UV, then `weft scene new --mesh`");
 }
 
 }  // namespace
@@ -43,7 +49,9 @@ v1::Scene read_scene(const std::string& path) {
 
 v1::Session create_session(Connection& connection, const v1::Scene& scene,
                            v1::CreateSessionRequest request) try {
-  *request.mutable_session()->mutable_scene() = scene;
+  // nothing is to be left of a scene that is only looked at
+  *request.mutable_session()->mutable_scene() =
+      request.validate_only() ? scene : upload_meshes(connection, scene);
   return connection.call(&v1::SessionService::Stub::CreateSession, request);
 } catch (const Problem& problem) {
   if (problem.code == "RESOURCE_EXHAUSTED" && problem.reason.empty()) {  // of gRPC itself

@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <condition_variable>
 #include <functional>
@@ -87,6 +88,8 @@ void repeat(const std::stop_token& stop, std::chrono::milliseconds period,
   }
 }
 
+constexpr std::chrono::minutes kLongestSweep{10};  // between two
+
 void sweep(Backend& backend, std::chrono::milliseconds ttl) try {
   sweep_assets(backend, std::chrono::system_clock::now() - ttl);
 } catch (const StoreError& error) {
@@ -151,7 +154,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
         [backend = &parts_->backend, idle = options.idle] { evict_sessions(*backend, idle); });
   if (options.asset_ttl.count() > 0)
     parts_->sweeping = std::jthread(
-        repeat, options.asset_ttl / 8,
+        repeat, std::min<std::chrono::milliseconds>(options.asset_ttl / 8, kLongestSweep),
         [backend = &parts_->backend, ttl = options.asset_ttl] { sweep(*backend, ttl); });
   for (const char* service : kServices) {
     parts_->grpc->GetHealthCheckService()->SetServingStatus(service, true);

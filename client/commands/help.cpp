@@ -55,7 +55,7 @@ With --json an error is one line on stderr, and stdout has answers alone:
   {"error": {"code": "INVALID_ARGUMENT", "reason": "FIELD_INVALID",
              "message": "...", "violations": [{"field": "...",
              "description": "..."}]}}
-A field is one of a scene file or a script, or an option. code is gRPC's. reason
+A field is one of a scene file or a script, an option, or a place in a mesh. code is gRPC's. reason
 is what a program should look at: the server's, such as SESSION_NOT_FOUND,
 FRAME_EXPIRED, STEP_UNSTABLE (proto/weft/v1 names them), or the client's own:
 USAGE, NO_CONNECTION, FILE_UNREADABLE, FILE_UNWRITABLE, FILE_MALFORMED,
@@ -74,6 +74,7 @@ bounds, and what it is when it is absent):
    "colliders": [{"sphere": {"center_m": {}, "radius_m": 0.3}}]}
 
   weft scene new --template sphere --textile denim_11oz -o scene.json
+  weft scene new --mesh shirt.obj --pin border:top -o shirt.json
   weft scene check scene.json        every mistake, or step, cost and warnings
   weft textile list                  presets, and which of them lack numbers
   weft session create scene.json --id drape

@@ -1,7 +1,11 @@
 #include <fmt/format.h>
 
+#include <numbers>
+
 #include "client/commands/commands.h"
 #include "client/exports/output_file.h"
+#include "client/imports/mesh_facts.h"
+#include "client/imports/mesh_scene.h"
 #include "client/message_field.h"
 #include "client/output/text.h"
 #include "client/scene_file.h"
@@ -11,8 +15,20 @@
 namespace weft::client {
 namespace {
 
+// Of a scene made from a mesh.
+struct MeshOptions {
+  std::string path;
+  std::vector<std::string> panel_textiles;  // "front=denim_11oz"
+  std::string unit = "m";
+  std::string up = "y";
+  double grain_degrees = 0;
+  ImportOptions import{};
+  MeshSceneOptions scene{};
+};
+
 struct NewOptions {
   std::string name;
+  MeshOptions mesh;
   std::string path;
   bool replace = false;
   std::string textile;
@@ -20,31 +36,82 @@ struct NewOptions {
   TemplateOptions values;
 };
 
+// A scene, and what there is to say about it.
+struct NewScene {
+  v1::Scene scene;
+  std::string text;
+  Json json = Json::object();
+};
+
+NewScene from_mesh(MeshOptions options, const TemplateOptions& values) {
+  const std::map<std::string, double> units{{"m", 1}, {"cm", 0.01}, {"mm", 0.001}};
+  const double grain = options.grain_degrees * std::numbers::pi / 180;
+  options.import.unit_m = units.at(options.unit);
+  options.import.z_up = options.up == "z";
+  options.import.grain_rad = options.scene.grain_rad = grain;
+  options.scene.textile = values.textile;
+  options.scene.accuracy = values.accuracy;
+  for (const std::string& given : options.panel_textiles) {
+    const auto [panel, textile] = read_setting(given);
+    options.scene.panel_textiles[panel] = textile_named(textile);
+  }
+  const Import import = import_mesh(options.path, options.import);
+  const MeshFacts facts = facts_of(import);
+  NewScene made{make_mesh_scene(options.path, import.mesh, options.scene),
+                facts_text(import, facts)};
+  made.json["mesh"] = facts_json(import, facts);
+  std::vector<int> counts;
+  for (const v1::Pin& pin : made.scene.sheets(0).pins()) counts.push_back(pin.particles_size());
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    made.text +=
+        fmt::format("pinned      {}: {}\n", options.scene.pins[i], count_of(counts[i], "particle"));
+  made.json["pinned"] = counts;
+  return made;
+}
+
+NewScene new_scene(const NewOptions& options) {
+  if (!options.mesh.path.empty()) return from_mesh(options.mesh, options.values);
+  if (options.name.empty())
+    throw usage_problem("--template says what to start from, or --mesh; see weft scene new --help");
+  return {make_template(options.name, options.values), ""};
+}
+
 void run_new(Context& context, NewOptions options) {
   if (!options.textile.empty()) options.values.textile = textile_named(options.textile);
-  v1::Scene scene = make_template(options.name, options.values);
+  NewScene made = new_scene(options);
   for (const std::string& field : options.fields) {
     const auto [place, value] = read_setting(field);
-    set_field(scene, place, value);
+    set_field(made.scene, place, value);
   }
   if (options.path.empty()) {
-    context.terminal.out << scene_text(scene) << std::flush;
+    context.terminal.err << made.text;
+    context.terminal.out << scene_text(made.scene) << std::flush;
     return;
   }
-  write_new_file(options.path, scene_text(scene), options.replace);
-  context.answer({{"file", options.path}}, "wrote " + options.path + '\n');
+  write_new_file(options.path, scene_text(made.scene), options.replace);
+  Json answer{{"file", options.path}};
+  answer.update(made.json);
+  context.answer(answer, made.text + "wrote " + options.path + '\n');
+}
+
+std::int64_t particles_of(const v1::Sheet& sheet) {
+  if (sheet.has_grid()) return std::int64_t{sheet.grid().rows()} * sheet.grid().columns();
+  constexpr std::size_t kPosition = 3 * sizeof(float), kFlat = 2 * sizeof(float);
+  const v1::MeshData& mesh = sheet.triangles().data();
+  return static_cast<std::int64_t>(mesh.positions_m().empty()
+                                       ? mesh.flat_m().size() / kFlat
+                                       : mesh.positions_m().size() / kPosition);
 }
 
 void run_check(Context& context, const std::string& path) {
   v1::CreateSessionRequest request;
   request.set_validate_only(true);
   context.prefer_embedded();
-  const v1::Session session = create_session(context.connection(), read_scene(path), request);
+  const v1::Scene scene = read_scene(path);
+  const v1::Session session = create_session(context.connection(), scene, request);
 
   std::int64_t particles = 0;
-  for (const auto& sheet : session.scene().sheets()) {
-    particles += std::int64_t{sheet.grid().rows()} * sheet.grid().columns();
-  }
+  for (const auto& sheet : scene.sheets()) particles += particles_of(sheet);
   const std::string heading = fmt::format(
       "{}: {}, {}, {}\n", path, count_of(session.scene().sheets_size(), "sheet"),
       count_of(particles, "particle"), count_of(session.scene().colliders_size(), "collider"));
@@ -62,6 +129,54 @@ std::string template_list() {
   return text;
 }
 
+constexpr const char* kMeshHelp = R"(
+A mesh becomes a sheet of triangles: its flat shape is its UV, a panel is a
+group (g) of an OBJ file where it has several, else a material (usemtl), else an
+object (o); of glTF a primitive. Polygons are cut into triangles. What was found
+is said: panels, borders, seams, scale, the triangles that keep the step short.
+Top is +y and right +x, as seen from the front. What cannot be simulated is
+refused with its place in the file.
+  weft scene new --mesh shirt.obj --pin border:top -o shirt.json
+  weft scene new --mesh dress.glb --mend --textile jersey_interlock \
+      --panel-textile belt=denim_11oz -o dress.json
+
+--mend joins points in one place, drops triangles without area, turns those that
+face the other way, and joins the ends of slivers, triangles lower than a
+quarter of the median, where no border or seam moves; it says what it did.
+)";
+
+void add_mesh_options(CLI::App& command, MeshOptions& options) {
+  CLI::Option* mesh =
+      command.add_option("--mesh", options.path, "Triangles to start from: .obj, .gltf or .glb")
+          ->type_name("FILE");
+  const auto of_mesh = [mesh](CLI::Option* option) { return option->needs(mesh); };
+  of_mesh(command.add_option("--flat-scale", options.import.flat_scale,
+                             "m for a unit of UV; else found by comparing lengths"))
+      ->type_name("M")
+      ->check(CLI::Range(1e-6, 1e6));
+  of_mesh(command.add_option("--unit", options.unit, "Of positions in the mesh; else m"))
+      ->check(CLI::IsMember({"m", "cm", "mm"}))
+      ->option_text("m|cm|mm");
+  of_mesh(command.add_option("--up", options.up, "Up in the mesh; else y"))
+      ->check(CLI::IsMember({"y", "z"}))
+      ->option_text("y|z");
+  of_mesh(command.add_option("--grain", options.grain_degrees,
+                             "From the v axis of UV to the warp, degrees, anticlockwise"))
+      ->type_name("DEG")
+      ->check(CLI::Range(-360.0, 360.0));
+  of_mesh(command.add_option("--panel-textile", options.panel_textiles,
+                             "Of one panel, as --textile; may be given again"))
+      ->option_text("PANEL=NAME|FILE.json")
+      ->allow_extra_args(false);
+  of_mesh(command.add_option("--pin", options.scene.pins,
+                             "Hold border:top (bottom, left, right, or its number), panel:NAME, "
+                             "panel:NAME:border:top, box:x0,y0,z0:x1,y1,z1 (m), or particles "
+                             "0,5,7-12; may be given again"))
+      ->option_text("WHAT")
+      ->allow_extra_args(false);
+  of_mesh(command.add_flag("--mend", options.import.mend, "Mend what is safe; see below"));
+}
+
 void add_new(CLI::App& scene, Context& context) {
   const std::map<std::string, v1::Evaluator> evaluators{{"series", v1::EVALUATOR_SERIES},
                                                         {"exact", v1::EVALUATOR_EXACT},
@@ -72,10 +187,10 @@ void add_new(CLI::App& scene, Context& context) {
                                                        {"fine", v1::ACCURACY_FINE}};
   auto options = std::make_shared<NewOptions>();
   TemplateOptions& values = options->values;
-  CLI::App* command = scene.add_subcommand("new", "Write a scene file from a template");
-  command->add_option("-t,--template", options->name, "Template to start from")
-      ->type_name("NAME")
-      ->required();
+  CLI::App* command =
+      scene.add_subcommand("new", "Write a scene file from a template, or from a mesh");
+  command->add_option("-t,--template", options->name, "Template to start from")->type_name("NAME");
+  add_mesh_options(*command, options->mesh);
   command->add_option("-o,--output", options->path, "Scene file to write; else it goes to stdout")
       ->type_name("FILE");
   command->add_flag("--force", options->replace, "Replace a file that exists");
@@ -107,7 +222,11 @@ void add_new(CLI::App& scene, Context& context) {
                    "One value by its place, such as sheets[0].skin_m=0.003; may be given again")
       ->option_text("FIELD=VALUE ...")
       ->allow_extra_args(false);
-  command->footer(template_list());
+  for (const char* of_templates :
+       {"--template", "--rows", "--columns", "--spacing", "--bend", "--evaluator", "--segments",
+        "--fold-clamp", "--optimal-breakpoints"})
+    command->get_option("--mesh")->excludes(command->get_option(of_templates));
+  command->footer(template_list() + kMeshHelp);
   command->callback([&context, options] { run_new(context, *options); });
 }
 

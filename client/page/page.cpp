@@ -14,6 +14,7 @@
 #include "client/page/facts.h"
 #include "client/page/packed_frames.h"
 #include "client/problem.h"
+#include "client/recording/cloth.h"
 #include "client/recording/points.h"
 #include "client/recording/reader.h"
 #include "client/recording/tally.h"
@@ -100,10 +101,10 @@ std::array<double, 3> middle_of(const Survey& survey) {
   return middle;
 }
 
-double quantum_of(const v1::Scene& scene, const Survey& survey) {
+double quantum_of(const std::vector<ClothMesh>& sheets, const Survey& survey) {
   double quantum = std::numeric_limits<double>::infinity();
-  for (const auto& sheet : scene.sheets())
-    quantum = std::min(quantum, sheet.grid().spacing_m() / kStepsOfSpacing);
+  for (const ClothMesh& sheet : sheets)
+    quantum = std::min(quantum, sheet.spacing_m / kStepsOfSpacing);
   for (std::size_t axis = 0; axis < 3; ++axis)
     quantum = std::max(quantum, (survey.high[axis] - survey.low[axis]) / kMostSteps);
   return quantum;
@@ -120,6 +121,7 @@ Json stats_json(const std::vector<v1::FrameStats>& stats) {
   return json;
 }
 
+// A grid in few numbers, a mesh as it was streamed; client/page/cloth.js makes triangles of both.
 Json sheets_json(const RecordingReader& recording) {
   Json sheets = Json::array();
   for (int i = 0; i < recording.header().sheets_size(); ++i) {
@@ -128,12 +130,18 @@ Json sheets_json(const RecordingReader& recording) {
     Json pinned = Json::array();
     for (const auto& pin : sheet.pins())
       for (const int particle : pin.particles()) pinned.push_back(particle);
-    sheets.push_back({{"first_particle", layout.first_particle()},
-                      {"rows", layout.rows()},
-                      {"columns", layout.columns()},
-                      {"spacing_m", sheet.grid().spacing_m()},
-                      {"pinned", std::move(pinned)},
-                      {"textile", to_json(sheet.textile())}});
+    Json& json = sheets.emplace_back(
+        Json{{"name", layout.name()}, {"first_particle", layout.first_particle()}});
+    if (is_grid(layout)) {
+      json["rows"] = layout.rows();
+      json["columns"] = layout.columns();
+      json["spacing_m"] = sheet.grid().spacing_m();
+    } else {
+      json["particle_count"] = layout.particle_count();
+      json["mesh"] = to_json(recording.topology()[static_cast<std::size_t>(i)], Defaults::kLeftOut);
+    }
+    json["pinned"] = std::move(pinned);
+    json["textile"] = to_json(sheet.textile());
   }
   return sheets;
 }
@@ -153,20 +161,22 @@ struct Source {
         recording(exhibit.path),
         range(frames_of(recording, wanted)),
         survey(survey_of(recording, range)),
-        quantum_m(quantum_of(recording.scene(), survey)) {}
+        cloth(cloth_of(recording)),
+        quantum_m(quantum_of(cloth, survey)) {}
 
   std::string name;
   std::vector<std::pair<std::string, std::string>> facts;
   RecordingReader recording;
   FrameRange range;
   Survey survey;
+  std::vector<ClothMesh> cloth;
   double quantum_m;
 };
 
 Json recording_json(const Source& source) {
   const RecordingReader& recording = source.recording;
   const Survey& survey = source.survey;
-  Json facts = page_facts(recording, survey.tally);
+  Json facts = page_facts(recording, source.cloth, survey.tally);
   if (!source.facts.empty()) {
     const Json measured{{"group", "Measured"}, {"rows", source.facts}};
     facts.insert(facts.begin(), measured);

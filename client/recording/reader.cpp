@@ -44,6 +44,7 @@ RecordingReader::RecordingReader(const std::string& path)
   } catch (const Problem& problem) {
     throw damaged(path, problem.what());
   }
+  topology_.resize(static_cast<std::size_t>(header_.sheets_size()));
 }
 
 std::int64_t RecordingReader::count_frames() {

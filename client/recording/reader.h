@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "client/recording/database.h"
+#include "client/sheet_layout.h"
 #include "weft/v1/frame.pb.h"
 #include "weft/v1/scene.pb.h"
 
@@ -19,6 +20,8 @@ class RecordingReader {
   const std::string& path() const { return path_; }
   const v1::Scene& scene() const { return scene_; }
   const v1::StreamHeader& header() const { return header_; }
+  // Sound; see meshes_of().
+  const Topology& topology() const { return topology_; }
   const std::string& recorded_at() const { return recorded_at_; }
 
   // It holds every frame from first_frame() to last_frame(); one less where there is none.
@@ -39,6 +42,7 @@ class RecordingReader {
   Database database_;
   v1::Scene scene_;
   v1::StreamHeader header_;
+  Topology topology_;
   std::string recorded_at_;
   std::int64_t last_frame_ = 0;
 };

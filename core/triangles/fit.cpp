@@ -40,18 +40,28 @@ class Fans {
     return ring;
   }
 
-  // With the neighbours of its neighbours.
-  std::vector<Neighbour> widened(int i) const {
-    const auto known = [&](const std::vector<Neighbour>& ring, int k) {
-      return std::any_of(ring.begin(), ring.end(),
-                         [&](const Neighbour& each) { return each.particle == k; });
-    };
+  // With those neighbours of its neighbours that at least so many of them have.
+  std::vector<Neighbour> widened(int i, int least) const {
     const std::vector<Neighbour> near = ring(i);
     std::vector<Neighbour> wide = near;
-    for (const auto& [j, offset, turn] : near)
-      for (const Neighbour& each : at(j).ring)
-        if (const int k = each.particle; k != i && !known(wide, k))
+    std::vector<int> times(near.size(), least);
+    for (const auto& [j, offset, turn] : near) {
+      for (const Neighbour& each : at(j).ring) {
+        const int k = each.particle;
+        if (k == i) continue;
+        std::size_t known = 0;
+        while (known < wide.size() && wide[known].particle != k) ++known;
+        if (known == wide.size()) {
           wide.push_back({k, offset + turn * each.offset, turn * turn_between(j, k)});
+          times.push_back(0);
+        }
+        ++times[known];
+      }
+    }
+    std::size_t kept = 0;
+    for (std::size_t n = 0; n < wide.size(); ++n)
+      if (times[n] >= least) wide[kept++] = wide[n];
+    wide.resize(kept);
     return wide;
   }
 
@@ -352,8 +362,10 @@ std::vector<CurvatureFit> fit_curvature(const RestShape& shape) {
   std::vector<Quadratic> quadratics;
   quadratics.reserve(static_cast<std::size_t>(shape.particles));
   for (int i = 0; i < shape.particles; ++i) {
-    const bool narrow = on_border[static_cast<std::size_t>(i)] || fans.at(i).ring.size() < kEnough;
-    quadratics.push_back(quadratic(narrow ? fans.widened(i) : fans.ring(i)));
+    const bool full = fans.at(i).ring.size() >= kEnough;
+    quadratics.push_back(quadratic(on_border[static_cast<std::size_t>(i)] ? fans.widened(i, 1)
+                                   : full                                 ? fans.ring(i)
+                                                                          : fans.widened(i, 2)));
     quadratics.back().area = area[i];
   }
   Balance(shape, fans, quadratics).restore();

@@ -92,7 +92,9 @@ grpc::Status finish_asset(Backend& backend, KeptAsset& asset) {
     count_assets(backend);
     return *error;
   }
-  asset.create_time = std::chrono::system_clock::now();
+  // as exactly as it is kept
+  asset.create_time =
+      std::chrono::floor<std::chrono::microseconds>(std::chrono::system_clock::now());
   asset.facts = std::get<v1::MeshFacts>(found).SerializeAsString();
   assets.finish(asset, asset.facts, *asset.create_time);
   return grpc::Status::OK;

@@ -14,7 +14,7 @@ namespace weft {
 namespace {
 
 constexpr int kAssetsId = 0x57454641;  // "WEFA"
-constexpr int kAssetsVersion = 1;                 // user_version of the file
+constexpr int kAssetsVersion = 1;      // user_version of the file
 constexpr const char* kAssetTables = R"(
   CREATE TABLE weft.asset (
     hash TEXT NOT NULL,           -- SHA-256 of the bytes, 64 hexadecimal digits
@@ -81,7 +81,8 @@ class SqliteStatements final : public Statements {
 class SqliteTables final : public Tables {
  public:
   explicit SqliteTables(std::string path)
-      : path_(std::move(path)), database_(":memory:", SQLite::OPEN_READWRITE) {
+      : path_(std::move(path)),
+        database_(":memory:", SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE) {
     try {
       open();
     } catch (const SQLite::Exception& error) {

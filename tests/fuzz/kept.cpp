@@ -4,7 +4,9 @@
 #include <string>
 
 #include "server/convert/convert.h"
+#include "server/store/assets.h"
 #include "server/store/records.h"
+#include "server/store/sqlite_tables.h"
 #include "tests/support/service/service.h"
 
 namespace {
@@ -23,11 +25,12 @@ Simulation small_simulation() {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) try {
   const google::protobuf::LogSilencer silence;
   static Simulation simulation = small_simulation();
+  static Assets assets(open_sqlite_tables(":memory:"));
   FuzzedDataProvider input(data, size);
   const int kind = input.ConsumeIntegralInRange(0, 3);
   const std::string bytes = input.ConsumeRemainingBytesAsString();
   if (kind == 0) {
-    records::decode_session(bytes);
+    records::decode_session(bytes, assets);
   } else if (kind == 1) {
     records::decode_progress(bytes);
   } else if (kind == 2) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "tests/support/service/assets.h"
 #include "tests/support/service/service.h"
 
 namespace {
@@ -21,9 +22,15 @@ ServerOptions small_limits() {
   return options;
 }
 
+const std::string& mesh_bytes() {
+  static const std::string bytes = weft::testing::square_mesh(1).SerializeAsString();
+  return bytes;
+}
+
 std::string some_text(FuzzedDataProvider& input) {
-  static const std::string kKnown[] = {"sessions/cloth", "cloth",        "sheet-1",
-                                       "wool_tropical",  "presets/silk", "raw.bend_n_m2"};
+  static const std::string kKnown[] = {
+      "sessions/cloth", "cloth",         "sheet-1",    "wool_tropical",
+      "presets/silk",   "raw.bend_n_m2", mesh_bytes(), weft::testing::name_of_asset(mesh_bytes())};
   return input.ConsumeBool() ? input.PickValueInArray(kKnown) : input.ConsumeRandomLengthString(8);
 }
 
@@ -88,7 +95,7 @@ std::string some_request(FuzzedDataProvider& input, const google::protobuf::Desc
   return request->SerializeAsString();
 }
 
-// There is the session cloth, and none else.
+// There is the session cloth, and none else; and the asset of mesh_bytes().
 void tidy(weft::testing::Service& service) {
   grpc::ClientContext context;
   v1::ListSessionsResponse all;
@@ -101,6 +108,7 @@ void tidy(weft::testing::Service& service) {
       service.erase(session);
   }
   if (!there) service.create(weft::testing::small_scene(), "cloth");
+  weft::testing::upload(*service.assets, mesh_bytes());
 }
 
 }  // namespace

@@ -119,7 +119,8 @@ class Subject {
     EXPECT_TRUE(
         service_.call(&Service::Sessions::ListSessions, v1::ListSessionsRequest(), &list).ok());
     for (const auto& session : list.sessions()) service_.erase(session);
-    for (const auto& asset : list_assets(*service_.assets).assets())
+    const auto page = list_assets(*service_.assets);
+    for (const auto& asset : page.assets())
       EXPECT_EQ(delete_asset(*service_.assets, asset.name()).code, grpc::StatusCode::OK);
     EXPECT_EQ(upload(*service_.assets, known_asset()).second.code, grpc::StatusCode::OK);
     session_ = service_.create(small_scene(), "it");

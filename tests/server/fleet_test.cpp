@@ -7,8 +7,10 @@
 #include <stdexcept>
 #include <thread>
 
+#include "server/store/assets.h"
 #include "server/store/records.h"
 #include "server/store/store.h"
+#include "tests/support/service/assets.h"
 #include "tests/support/service/postgres.h"
 #include "tests/support/service/process.h"
 #include "tests/support/service/service.h"
@@ -486,6 +488,53 @@ TEST_F(Fleet, TellsNobodyWhereTheSessionsOfOthersAre) {
   ASSERT_TRUE(his.ParseFromString(ask(*b, "b1", "ListSessions", v1::ListSessionsRequest()).first));
   EXPECT_THAT(hers.sessions(), SizeIs(1));
   EXPECT_THAT(his.sessions(), SizeIs(0));
+}
+
+TEST_F(Fleet, GoesOnWithAnUploadThatAnotherServerBegan) {
+  const auto a = server("a"), b = server("b");
+  const std::string bytes = square_mesh(300).SerializeAsString(), name = name_of_asset(bytes);
+  const auto size = static_cast<std::int64_t>(bytes.size());
+  {
+    Upload begun(*a->assets, name, size);
+    begun.send(0, bytes.substr(0, Assets::kPiece));
+    while (get_asset(*b->assets, name).first.received_bytes() == 0)
+      std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_EQ(upload(*b->assets, bytes).first.received_bytes(), size);
+  EXPECT_EQ(download(*a->assets, name).first, bytes);
+}
+
+TEST_F(Fleet, GoesOnWithASessionThatNamesAnAsset) {
+  auto a = server("a");
+  const auto b = server("b");
+  const v1::MeshData mesh = square_mesh(4);
+  const std::string name = name_of_asset(mesh.SerializeAsString());
+  const v1::Session session = a->create(scene_of(mesh));
+  a->step(session, 10);
+  const auto before = frames(*a, session, 10);
+  EXPECT_EQ(delete_asset(*b->assets, name).reason(), "ASSET_USED");
+  v1::ListSessionsResponse listed;
+  ASSERT_TRUE(b->call(&Sessions::ListSessions, {}, &listed).ok());
+  ASSERT_THAT(listed.sessions(), SizeIs(1));
+  EXPECT_EQ(listed.sessions(0).scene().sheets(0).triangles().asset(), name);
+  a.reset();
+  EXPECT_EQ(insist(*b, session).scene().sheets(0).triangles().asset(), name);
+  b->step(session, 1);
+  expect_equal(frames(*b, session, 10), before);
+  b->erase(session);
+  EXPECT_EQ(delete_asset(*b->assets, name).code, grpc::StatusCode::OK);
+}
+
+TEST_F(Fleet, OpensADatabaseThatHadNoAssets) {
+  auto a = server("a");
+  const v1::Session session = a->create();
+  a.reset();
+  change("DROP TABLE weft.asset_use, weft.asset_piece, weft.asset");
+  change("UPDATE weft.version SET number = 1");
+  const auto b = server("b");
+  EXPECT_EQ(insist(*b, session).uid(), session.uid());
+  EXPECT_EQ(upload(*b->assets, square_mesh(2).SerializeAsString()).second.code,
+            grpc::StatusCode::OK);
 }
 
 TEST_F(Fleet, SaysWhatIsWrongWithADatabase) {

@@ -41,6 +41,27 @@ v1::MeshData square_mesh(int cells) {
   return mesh;
 }
 
+v1::Scene scene_of(const v1::MeshData& mesh) {
+  v1::Scene scene = scene_of(std::string());
+  *scene.mutable_sheets(0)->mutable_triangles()->mutable_data() = mesh;
+  return scene;
+}
+
+v1::Scene scene_of(const std::string& asset) {
+  v1::Scene scene;
+  v1::Sheet* sheet = scene.add_sheets();
+  sheet->mutable_triangles()->set_asset(asset);
+  v1::MeasuredTextile* textile = sheet->mutable_textile()->mutable_measured();
+  textile->set_areal_density_kg_per_m2(0.2);
+  textile->set_tensile_warp_n_per_m(100);
+  textile->set_tensile_weft_n_per_m(100);
+  textile->set_shear_n_per_m(20);
+  textile->set_bend_rigidity_warp_n_m(1e-5);
+  textile->set_bend_rigidity_weft_n_m(1e-5);
+  sheet->add_pins()->add_particles(0);
+  return scene;
+}
+
 std::string name_of_asset(const std::string& bytes) { return "assets/" + sha256(bytes); }
 
 Upload::Upload(v1::AssetService::Stub& assets, const std::string& name, std::int64_t size,

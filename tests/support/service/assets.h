@@ -14,6 +14,10 @@ namespace weft::testing {
 // A flat square of 1 m x 1 m in cells x cells x 2 triangles, its flat shape what it is in space.
 v1::MeshData square_mesh(int cells);
 
+// A sheet of the mesh, held by its first particle. By itself, or by the name of an asset.
+v1::Scene scene_of(const v1::MeshData& mesh);
+v1::Scene scene_of(const std::string& asset);
+
 // "assets/{hash}".
 std::string name_of_asset(const std::string& bytes);
 

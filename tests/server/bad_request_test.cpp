@@ -40,6 +40,7 @@ bool names(const std::string& at, const std::string& path, const FieldDescriptor
   const std::string parent = path.substr(0, path.rfind('.'));
   if (at == path || at.starts_with(path + ".") || at.starts_with(path + "[") || at == parent)
     return true;
+  if (path.starts_with(at + "[")) return true;
   if (path == "start_frame") return at == "end_frame";  // it lies before
   const auto* oneof = field.real_containing_oneof();
   if (oneof == nullptr) return false;
@@ -74,7 +75,13 @@ TEST(GoodScenes, AreShownAsTheyWereGiven) {
   Service service;
   v1::Scene given = full_scene();
   given.mutable_sheets()->RemoveLast();  // a preset is shown by its values
+  upload(*service.assets, known_asset());
   const v1::Scene shown = service.create(given).scene();
+  for (v1::Sheet& sheet : *given.mutable_sheets()) {
+    if (!sheet.triangles().has_data()) continue;  // a mesh is shown by its name
+    const std::string bytes = sheet.triangles().data().SerializeAsString();
+    sheet.mutable_triangles()->set_asset(name_of_asset(bytes));
+  }
   google::protobuf::util::MessageDifferencer differencer;
   differencer.set_scope(google::protobuf::util::MessageDifferencer::PARTIAL);
   std::string differences;

@@ -41,6 +41,21 @@ void add_path(Message* message) {
   }
 }
 
+// A square with all that a mesh can have.
+v1::MeshData full_mesh(const v1::Textile& textile) {
+  v1::MeshData mesh = square_mesh(2);
+  const std::size_t plane = mesh.flat_m().size() / 2;
+  const std::string u = mesh.flat_m().substr(0, plane), v = mesh.flat_m().substr(plane);
+  mesh.set_positions_m(u + std::string(plane, '\0') + v);
+  mesh.set_flat_triangles(mesh.triangles());
+  v1::Panel* panel = mesh.add_panels();
+  panel->set_name("front");
+  panel->set_triangle_count(8);
+  panel->set_grain_rad(0.1);
+  *panel->mutable_textile() = textile;
+  return mesh;
+}
+
 }  // namespace
 
 v1::Scene full_scene() {
@@ -79,6 +94,12 @@ v1::Scene full_scene() {
   textile->set_air_drag_kg_per_m2_s(0.1);
   measured->mutable_bending()->mutable_isometric()->set_resist_compression(false);
   measured->mutable_textile()->set_damping_ratio(1e-3);
+  v1::Sheet* mesh = scene.add_sheets();
+  *mesh->mutable_textile() = measured->textile();
+  *mesh->mutable_triangles()->mutable_data() = full_mesh(measured->textile());
+  v1::Sheet* uploaded = scene.add_sheets();
+  *uploaded->mutable_textile() = measured->textile();
+  uploaded->mutable_triangles()->set_asset(name_of_asset(known_asset()));
   v1::Sheet* preset = scene.add_sheets();
   *preset->mutable_grid() = sheet->grid();
   preset->mutable_textile()->set_preset("denim_11oz");

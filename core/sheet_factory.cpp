@@ -24,6 +24,8 @@ std::string_view needs_plain_solver(const Scene& scene, const SheetDefinition& s
   if (scene.solver.plain) return "asked for";
   if (scene.solver.integrator != IntegratorKind::kVerlet) return "the integrator is not VERLET";
   const auto* law = std::get_if<ChoiKo>(&sheet.bending);
+  if (law != nullptr && std::holds_alternative<Triangles>(sheet.shape))
+    return "CHOI_KO on triangles";
   const bool slow = law != nullptr &&
                     (law->evaluator == Evaluator::kSeries || law->evaluator == Evaluator::kExact);
   return slow ? "the evaluator is SERIES or EXACT" : "";

@@ -73,10 +73,10 @@ void run_render(Context& context, const RenderOptions& options) {
 }  // namespace
 
 void add_render(CLI::App& app, Context& context) {
-  const std::map<std::string, Colouring> colourings{{"cloth", Colouring::kCloth},
-                                                    {"strain", Colouring::kStrain},
-                                                    {"speed", Colouring::kSpeed},
-                                                    {"bending", Colouring::kBending}};
+  const std::map<std::string, Colouring> colourings{
+      {"cloth", Colouring::kCloth}, {"panels", Colouring::kPanels},  {"strain", Colouring::kStrain},
+      {"warp", Colouring::kWarp},   {"weft", Colouring::kWeft},      {"shear", Colouring::kShear},
+      {"speed", Colouring::kSpeed}, {"bending", Colouring::kBending}};
   auto options = std::make_shared<RenderOptions>();
   RenderOrder& order = options->order;
   CLI::App* command = app.add_subcommand("render", "Make a picture of frames of recordings");
@@ -98,11 +98,13 @@ void add_render(CLI::App& app, Context& context) {
       ->excludes(frame);
   command
       ->add_option("--colour", order.colouring,
-                   "cloth: a front and a back\nstrain: the largest at each particle\n"
+                   "cloth: a front and a back\npanels: a colour for each\n"
+                   "strain: the largest at each particle\n"
+                   "warp, weft, shear: strain around each particle, by sign\n"
                    "speed: of each particle since the frame before\n"
                    "bending: energy for each area, by the rigidities of the textile at the start")
       ->transform(one_of(colourings))
-      ->option_text("cloth|strain|speed|bending");
+      ->option_text("cloth|panels|strain|warp|weft|shear|speed|bending");
   command
       ->add_option("--azimuth", order.outlook.azimuth,
                    "Seen from the front (0), from the right (90); else 30")

@@ -3,6 +3,8 @@
 
 const kRamp = ['#3288bd', '#66c2a5', '#abdda4', '#e6f598', '#fee08b', '#fdae61', '#f46d43', '#d53e4f',
   '#9e0142'];  // ColorBrewer's Spectral
+const kBalance = ['#3b4cc0', '#6f92f3', '#aac7fd', '#dddddd', '#f7b89c', '#e7745b', '#b40426'];  // Moreland's cool to warm
+const kPanels = ['#66c2a5', '#fc8d62', '#8da0cb', '#e78ac3', '#a6d854', '#ffd92f', '#e5c494', '#b3b3b3'];  // ColorBrewer's Set2
 
 const vector = (given) => new THREE.Vector3(given?.x ?? 0, given?.y ?? 0, given?.z ?? 0);
 const linear = (colour) => new THREE.Color(colour).convertSRGBToLinear();
@@ -13,13 +15,15 @@ function cornersOf({min, max}) {
     new THREE.Vector3(k & 1 ? max.x : min.x, k & 2 ? max.y : min.y, k & 4 ? max.z : min.z));
 }
 
-// The ramp in 256 steps, linear RGB.
-const kRampSteps = Float32Array.from({length: 256 * 3}, (_, k) => {
-  const place = Math.floor(k / 3) / 255 * (kRamp.length - 1);
-  const from = Math.min(Math.floor(place), kRamp.length - 2);
-  const colour = new THREE.Color(kRamp[from]).lerp(new THREE.Color(kRamp[from + 1]), place - from);
+// A ramp in 256 steps, linear RGB.
+const stepsOf = (ramp) => Float32Array.from({length: 256 * 3}, (_, k) => {
+  const place = Math.floor(k / 3) / 255 * (ramp.length - 1);
+  const from = Math.min(Math.floor(place), ramp.length - 2);
+  const colour = new THREE.Color(ramp[from]).lerp(new THREE.Color(ramp[from + 1]), place - from);
   return colour.convertSRGBToLinear().toArray()[k % 3];
 });
+const kRampSteps = stepsOf(kRamp);
+const kBalanceSteps = stepsOf(kBalance);
 
 function pathOffset(path, t) {
   if (!path?.length) return vector();
@@ -98,65 +102,21 @@ function colliderMesh(collider, material, centre, reach) {
   return group;
 }
 
-// Largest strain of a particle's stretch connections, (l - L) / L; 0 where none is stretched.
-function writeStrains(sheets, out, p) {
-  out.fill(0);
-  for (const {first_particle, rows, columns, spacing_m} of sheets) {
-    const stretch = (i, j) => {
-      const length = Math.hypot(p[3 * i] - p[3 * j], p[3 * i + 1] - p[3 * j + 1], p[3 * i + 2] - p[3 * j + 2]);
-      const strain = length / spacing_m - 1;
-      if (strain > out[i]) out[i] = strain;
-      if (strain > out[j]) out[j] = strain;
-    };
-    for (let row = 0; row < rows; ++row) {
-      for (let column = 0; column < columns; ++column) {
-        const i = first_particle + row * columns + column;
-        if (column + 1 < columns) stretch(i, i + 1);
-        if (row + 1 < rows) stretch(i, i + columns);
-      }
-    }
-  }
-}
-
-// Energy for each area, J/m^2: of the curvatures along warp and weft and of the twist, by the rigidities of the
-// textile, whatever the bending law. Differences as in the isometric law; a particle's twist is the mean of its cells.
-function writeBending(sheets, out, p) {
-  out.fill(0);
-  for (const {first_particle, rows, columns, spacing_m, textile: {measured, raw}} of sheets) {
-    const warp = measured ? measured.bend_rigidity_warp_n_m : 1.5 * raw.bend_n_m2 / spacing_m;
-    const weft = measured ? measured.bend_rigidity_weft_n_m : warp;
-    const squaredCurvature = (a, b, c, d) => {
-      let sum = 0;
-      for (let axis = 0; axis < 3; ++axis) {
-        sum += (p[3 * a + axis] - p[3 * b + axis] - p[3 * c + axis] + p[3 * d + axis]) ** 2;
-      }
-      return sum / spacing_m ** 4;
-    };
-    const isInside = (i, count) => i > 0 && i + 1 < count;
-    for (let row = 0; row < rows; ++row) {
-      for (let column = 0; column < columns; ++column) {
-        const i = first_particle + row * columns + column;
-        if (isInside(column, columns)) out[i] += warp / 2 * squaredCurvature(i - 1, i, i, i + 1);
-        if (isInside(row, rows)) out[i] += weft / 2 * squaredCurvature(i - columns, i, i, i + columns);
-        if (row + 1 === rows || column + 1 === columns) continue;
-        const twist = (warp + weft) / 2 * squaredCurvature(i, i + 1, i + columns, i + columns + 1);
-        for (const r of [row, row + 1]) {
-          for (const c of [column, column + 1]) {
-            const cells = (isInside(r, rows) ? 2 : 1) * (isInside(c, columns) ? 2 : 1);
-            out[first_particle + r * columns + c] += twist / cells;
-          }
-        }
-      }
-    }
-  }
-}
-
+// What colours say of a particle. Around 0 where `balanced`, else from 0 on.
+const percent = (value) => `${(100 * value).toPrecision(3)} %`;
 const kQuantities = {
   strain: {
     title: 'Strain, largest at a particle',
-    text: (value) => `${(100 * value).toPrecision(3)} %`,
-    write: (source, out, positions) => writeStrains(source.sheets, out, positions),
+    text: percent,
+    write: ({cloth}, out, positions) => cloth.writeLargestStrain(out, positions),
   },
+  ...Object.fromEntries([['warp', 'Strain along the warp'], ['weft', 'Strain along the weft'],
+    ['shear', 'Shear, sine of its angle']].map(([name, title]) => [name, {
+    title,
+    balanced: true,
+    text: percent,
+    write: ({cloth}, out, positions) => cloth.writeStrain(kStrains[name], out, positions),
+  }])),
   speed: {
     title: 'Speed of a particle',
     text: (value) => `${value.toPrecision(3)} m/s`,
@@ -165,11 +125,12 @@ const kQuantities = {
   bending: {
     title: 'Bending energy for each area',
     text: (value) => `${digits(value)} J/m²`,
-    write: (source, out, positions) => writeBending(source.sheets, out, positions),
+    write: ({cloth}, out, positions) => cloth.writeBending(out, positions),
   },
 };
+const largestOf = (values, atLeast = 0) => values.reduce((most, value) => Math.max(most, Math.abs(value)), atLeast);
 
-// A recording, or a session, in a scene of its own. It says what there is ({name, particles, sheets, colliders,
+// A recording, or a session, in a scene of its own. It says what there is ({name, particles, cloth, colliders,
 // origin_m, gravity_m_per_s2, low_m, high_m}) and where the particles are (place, write, writeSpeeds, largest).
 class Pane {
   constructor(source, box, up) {
@@ -203,43 +164,30 @@ class Pane {
   }
 
   addCloth() {
-    const {particles, sheets, origin_m} = this.source;
+    const {particles, cloth, origin_m} = this.source;
     const attribute = () =>
       new THREE.BufferAttribute(new Float32Array(3 * particles), 3).setUsage(THREE.DynamicDrawUsage);
     this.position = attribute();
     this.normal = attribute();
     this.colour = attribute();
 
-    const cells = [];
-    const threads = [];
-    const pins = [];
-    for (const {first_particle, rows, columns, pinned} of sheets) {
-      for (const index of pinned) pins.push(first_particle + index);
-      for (let row = 0; row < rows; ++row) {
-        for (let column = 0; column < columns; ++column) {
-          const i = first_particle + row * columns + column;
-          const right = column + 1 < columns;
-          const below = row + 1 < rows;
-          if (right) threads.push(i, i + 1);
-          if (below) threads.push(i, i + columns);
-          if (right && below) cells.push(i, i + columns, i + columns + 1, i, i + columns + 1, i + 1);
-        }
-      }
-    }
     const geometry = (index) => {
       const made = new THREE.BufferGeometry();
       made.setAttribute('position', this.position);
       made.setAttribute('normal', this.normal);
       made.setAttribute('color', this.colour);
-      made.setIndex(index);
+      made.setIndex(new THREE.BufferAttribute(Uint32Array.from(index), 1));
       return made;
     };
-    const surface = geometry(cells);
+    const surface = geometry(cloth.triangles);
+    cloth.panels.forEach(({first, triangle_count}, k) => surface.addGroup(3 * first, 3 * triangle_count, k));
     const options = {polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1};
+    const material = (side, more) =>
+      new THREE.MeshLambertMaterial({...options, side, shadowSide: THREE.DoubleSide, ...more});
     this.faces = [THREE.FrontSide, THREE.BackSide].map((side) => ({
-      plain: new THREE.MeshLambertMaterial({...options, side, shadowSide: THREE.DoubleSide}),
-      coloured: new THREE.MeshLambertMaterial(
-        {...options, side, shadowSide: THREE.DoubleSide, vertexColors: THREE.VertexColors}),
+      plain: material(side),
+      coloured: material(side, {vertexColors: THREE.VertexColors}),
+      panels: cloth.panels.map(() => material(side)),
     }));
     this.cloth = new THREE.Group();
     this.cloth.position.set(...origin_m);
@@ -248,15 +196,17 @@ class Pane {
       mesh.castShadow = mesh.receiveShadow = true;
       this.cloth.add(mesh);
     }
-    this.lattice = new THREE.LineSegments(geometry(threads),
-      new THREE.LineBasicMaterial({transparent: true, opacity: 0.25}));
-    this.lattice.visible = false;
-    this.pins = new THREE.Points(geometry(pins), dots(8));
+    this.lines = new THREE.Group();
+    for (const [lines, opacity] of [[cloth.threads, 0.25], [cloth.edges, 0.7]]) {
+      this.lines.add(new THREE.LineSegments(geometry(lines), new THREE.LineBasicMaterial({transparent: true, opacity})));
+    }
+    this.lines.visible = false;
+    this.pins = new THREE.Points(geometry(cloth.pins), dots(8));
     this.held = new THREE.Points(geometry([0]), dots(16));
     this.held.material.depthTest = false;  // seen through folds
     this.held.visible = false;
-    this.cloth.add(this.lattice, this.pins, this.held);
-    for (const child of this.cloth.children) child.frustumCulled = false;  // its bounds change with every frame
+    this.cloth.add(this.lines, this.pins, this.held);
+    this.cloth.traverse((child) => { child.frustumCulled = false; });  // its bounds change with every frame
     this.scene.add(this.cloth);
   }
 
@@ -311,7 +261,7 @@ class Pane {
     this.faces[1].plain.color.copy(linear(style('--cloth-back')));
     this.bodyMaterial.color.copy(linear(style('--body')));
     this.grid.material.color.copy(linear(style('--grid')));
-    this.lattice.material.color.copy(linear(style('--lattice')));
+    for (const {material} of this.lines.children) material.color.copy(linear(style('--lines')));
     for (const {material} of [this.pins, this.held]) material.color.copy(linear(style('--accent')));
   }
 
@@ -321,47 +271,35 @@ class Pane {
     if (!between) place.share = 0;
     this.frame = place.frame;
     this.source.write(this.position.array, place);
-    this.writeNormals();
-    if (quantity) kQuantities[quantity].write(this.source, this.values, this.position.array, place.frame);
+    this.source.cloth.writeNormals(this.normal.array, this.position.array);
+    kQuantities[quantity]?.write(this.source, this.values, this.position.array, place.frame);
     this.position.needsUpdate = this.normal.needsUpdate = true;
     for (const {mesh, path} of this.bodies) mesh.position.copy(pathOffset(path, t));
   }
 
-  // Across the two diagonals of a particle's neighbours.
-  writeNormals() {
-    const p = this.position.array;
-    const n = this.normal.array;
-    for (const {first_particle, rows, columns} of this.source.sheets) {
-      for (let row = 0; row < rows; ++row) {
-        for (let column = 0; column < columns; ++column) {
-          const i = 3 * (first_particle + row * columns + column);
-          const left = column > 0 ? i - 3 : i;
-          const right = column + 1 < columns ? i + 3 : i;
-          const above = row > 0 ? i - 3 * columns : i;
-          const below = row + 1 < rows ? i + 3 * columns : i;
-          const ux = p[right] - p[left], uy = p[right + 1] - p[left + 1], uz = p[right + 2] - p[left + 2];
-          const vx = p[below] - p[above], vy = p[below + 1] - p[above + 1], vz = p[below + 2] - p[above + 2];
-          const x = vy * uz - vz * uy, y = vz * ux - vx * uz, z = vx * uy - vy * ux;
-          const length = Math.hypot(x, y, z) || 1;
-          n[i] = x / length;
-          n[i + 1] = y / length;
-          n[i + 2] = z / length;
-        }
-      }
-    }
+  // The colours of panels, by their names.
+  paintPanels(colours) {
+    this.source.cloth.panels.forEach(({name}, k) => {
+      const colour = linear(colours.get(name));
+      this.faces[0].panels[k].color.copy(colour);
+      this.faces[1].panels[k].color.copy(colour).lerp(linear('#808080'), 0.45);
+    });
   }
 
   colourBy(quantity, most) {
-    this.faces.forEach(({plain, coloured}, k) => {
-      this.cloth.children[k].material = quantity ? coloured : plain;
+    const known = kQuantities[quantity];
+    this.faces.forEach(({plain, coloured, panels}, k) => {
+      this.cloth.children[k].material = known ? coloured : quantity ? panels : plain;
     });
-    if (!quantity) return;
+    if (!known) return;
     const out = this.colour.array;
+    const [steps, middle] = known.balanced ? [kBalanceSteps, 127.5] : [kRampSteps, 0];
     for (let i = 0; i < this.values.length; ++i) {
-      const step = 3 * Math.min(255, most > 0 ? Math.round(255 * this.values[i] / most) : 0);
-      out[3 * i] = kRampSteps[step];
-      out[3 * i + 1] = kRampSteps[step + 1];
-      out[3 * i + 2] = kRampSteps[step + 2];
+      const share = most > 0 ? this.values[i] / most : 0;
+      const step = 3 * Math.min(255, Math.round(middle + (255 - middle) * share));
+      out[3 * i] = steps[step];
+      out[3 * i + 1] = steps[step + 1];
+      out[3 * i + 2] = steps[step + 2];
     }
     this.colour.needsUpdate = true;
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -38,11 +39,36 @@ std::string bending_text(const v1::BendingLaw& bending) {
   }
 }
 
-Rows sheet_rows(const v1::Sheet& sheet) {
-  const v1::Grid& grid = sheet.grid();
-  Rows rows{{"particles", fmt::format("{} x {}", grid.rows(), grid.columns())},
-            {"spacing", value_text(1e3 * grid.spacing_m(), "mm")}};
-  const v1::Textile& textile = sheet.textile();
+// Of a sheet of triangles.
+Rows shape_rows(const v1::SheetLayout& layout, const ClothMesh& mesh) {
+  double area = 0;
+  Rows panels;
+  for (const ClothPanel& panel : mesh.panels) {
+    const double part = area_of(mesh, panel);
+    area += part;
+    std::string text = value_text(part, "m²");
+    if (panel.grain_rad != 0)
+      text += fmt::format(", grain {}°", number_text(panel.grain_rad * 180 / std::numbers::pi));
+    if (panel.own_textile) text += ", textile of its own";
+    if (!panel.preset.empty()) text += ", textile " + panel.preset;
+    panels.emplace_back("panel " + panel.name, std::move(text));
+  }
+  Rows rows{{"particles", std::to_string(layout.particle_count())},
+            {"triangles", std::to_string(mesh.triangles.size())},
+            {"median edge", value_text(1e3 * mesh.spacing_m, "mm")},
+            {"area", value_text(area, "m²")},
+            {"panels", std::to_string(mesh.panels.size())}};
+  if (panels.size() > 1) rows.insert(rows.end(), panels.begin(), panels.end());
+  return rows;
+}
+
+Rows shape_rows(const v1::Grid& grid) {
+  return {{"particles", fmt::format("{} x {}", grid.rows(), grid.columns())},
+          {"spacing", value_text(1e3 * grid.spacing_m(), "mm")}};
+}
+
+Rows textile_rows(const v1::Textile& textile) {
+  Rows rows;
   if (textile.has_measured()) {
     const v1::MeasuredTextile& values = textile.measured();
     rows.emplace_back("areal density", value_text(values.areal_density_kg_per_m2(), "kg/m²"));
@@ -69,6 +95,18 @@ Rows sheet_rows(const v1::Sheet& sheet) {
   else
     rows.emplace_back("damping", "default");
   rows.emplace_back("friction", number_text(textile.friction_coefficient()));
+  return rows;
+}
+
+Rows sheet_rows(const v1::SheetLayout& layout, const v1::Sheet& sheet, const ClothMesh& mesh) {
+  Rows rows = is_grid(layout) ? shape_rows(sheet.grid()) : shape_rows(layout, mesh);
+  const Rows textile = textile_rows(sheet.textile());
+  rows.insert(rows.end(), textile.begin(), textile.end());
+  for (const ClothPanel& panel : mesh.panels) {
+    if (!panel.own_textile) continue;
+    for (const auto& [label, text] : textile_rows(panel.textile))
+      rows.emplace_back(fmt::format("{} of {}", label, panel.name), text);
+  }
   rows.emplace_back("bending law", bending_text(sheet.bending()));
   return rows;
 }
@@ -112,12 +150,15 @@ Rows world_rows(const v1::Scene& scene) {
 
 }  // namespace
 
-Json page_facts(const RecordingReader& recording, const Tally& tally) {
+Json page_facts(const RecordingReader& recording, const std::vector<ClothMesh>& cloth,
+                const Tally& tally) {
   Json facts = Json::array();
   facts.push_back({{"group", "Recording"}, {"rows", run_rows(recording, tally)}});
-  for (const auto& sheet : recording.scene().sheets()) {
+  for (int i = 0; i < recording.scene().sheets_size(); ++i) {
+    const v1::Sheet& sheet = recording.scene().sheets(i);
     facts.push_back({{"group", fmt::format("Textile of {} at the start", sheet.name())},
-                     {"rows", sheet_rows(sheet)}});
+                     {"rows", sheet_rows(recording.header().sheets(i), sheet,
+                                         cloth[static_cast<std::size_t>(i)])}});
   }
   facts.push_back({{"group", "Surroundings"}, {"rows", world_rows(recording.scene())}});
   return facts;

@@ -85,7 +85,8 @@ class Live extends Stage {
   // A credit for each frame, granted when the one before was drawn: a browser that is slow, or hidden, sees fewer.
   async watch(name, stream, wanted) {
     const shown = await session('GetSession', {name});
-    const {header} = await stream.ask({session: name, uid: shown.uid, format: {stats: true}, credits: 1});
+    const topology = shown.scene.sheets.some(({grid}) => !grid);
+    const {header} = await stream.ask({session: name, uid: shown.uid, format: {stats: true, topology}, credits: 1});
     this.setState(stateOf(shown));
     const sight = new Sight(shown, header);
     for (let request = ''; wanted();) {
@@ -94,6 +95,7 @@ class Live extends Stage {
       trouble('view', '');
       request = '';
       if (answer.progress) this.setState(stateOf(answer.progress));
+      if (answer.topology && !header.sheets[answer.topology.sheet].rows) sight.layOut(answer.topology);
       if (!answer.frame) continue;
       sight.take(answer);
       if (this.begun !== sight) this.begin(sight);

@@ -14,6 +14,7 @@
 #include "client/page/facts.h"
 #include "client/page/packed_frames.h"
 #include "client/problem.h"
+#include "client/recording/cloth.h"
 #include "client/recording/points.h"
 #include "client/recording/reader.h"
 #include "client/recording/tally.h"
@@ -100,10 +101,10 @@ std::array<double, 3> middle_of(const Survey& survey) {
   return middle;
 }
 
-double quantum_of(const v1::Scene& scene, const Survey& survey) {
+double quantum_of(const std::vector<ClothMesh>& sheets, const Survey& survey) {
   double quantum = std::numeric_limits<double>::infinity();
-  for (const auto& sheet : scene.sheets())
-    quantum = std::min(quantum, sheet.grid().spacing_m() / kStepsOfSpacing);
+  for (const ClothMesh& sheet : sheets)
+    quantum = std::min(quantum, sheet.spacing_m / kStepsOfSpacing);
   for (std::size_t axis = 0; axis < 3; ++axis)
     quantum = std::max(quantum, (survey.high[axis] - survey.low[axis]) / kMostSteps);
   return quantum;
@@ -120,20 +121,38 @@ Json stats_json(const std::vector<v1::FrameStats>& stats) {
   return json;
 }
 
-Json sheets_json(const RecordingReader& recording) {
+// A mesh as it was streamed, without what is nothing, and the panels' own textiles.
+Json mesh_json(v1::MeshData mesh, const ClothMesh& cloth) {
+  for (int p = 0; p < mesh.panels_size(); ++p) {
+    const ClothPanel& panel = cloth.panels[static_cast<std::size_t>(p)];
+    if (panel.own_textile) *mesh.mutable_panels(p)->mutable_textile() = panel.textile;
+  }
+  return to_json(mesh, Defaults::kLeftOut);
+}
+
+// client/page/cloth.js makes triangles of both kinds.
+Json sheets_json(const RecordingReader& recording, const std::vector<ClothMesh>& cloth) {
   Json sheets = Json::array();
   for (int i = 0; i < recording.header().sheets_size(); ++i) {
     const v1::SheetLayout& layout = recording.header().sheets(i);
     const v1::Sheet& sheet = recording.scene().sheets(i);
+    const auto s = static_cast<std::size_t>(i);
     Json pinned = Json::array();
     for (const auto& pin : sheet.pins())
       for (const int particle : pin.particles()) pinned.push_back(particle);
-    sheets.push_back({{"first_particle", layout.first_particle()},
-                      {"rows", layout.rows()},
-                      {"columns", layout.columns()},
-                      {"spacing_m", sheet.grid().spacing_m()},
-                      {"pinned", std::move(pinned)},
-                      {"textile", to_json(sheet.textile())}});
+    Json json{{"name", layout.name()},
+              {"first_particle", layout.first_particle()},
+              {"pinned", std::move(pinned)},
+              {"textile", to_json(sheet.textile())}};
+    if (is_grid(layout)) {
+      json["rows"] = layout.rows();
+      json["columns"] = layout.columns();
+      json["spacing_m"] = cloth[s].spacing_m;
+    } else {
+      json["particle_count"] = layout.particle_count();
+      json["mesh"] = mesh_json(recording.topology()[s], cloth[s]);
+    }
+    sheets.push_back(std::move(json));
   }
   return sheets;
 }
@@ -153,20 +172,22 @@ struct Source {
         recording(exhibit.path),
         range(frames_of(recording, wanted)),
         survey(survey_of(recording, range)),
-        quantum_m(quantum_of(recording.scene(), survey)) {}
+        cloth(cloth_of(recording)),
+        quantum_m(quantum_of(cloth, survey)) {}
 
   std::string name;
   std::vector<std::pair<std::string, std::string>> facts;
   RecordingReader recording;
   FrameRange range;
   Survey survey;
+  std::vector<ClothMesh> cloth;
   double quantum_m;
 };
 
 Json recording_json(const Source& source) {
   const RecordingReader& recording = source.recording;
   const Survey& survey = source.survey;
-  Json facts = page_facts(recording, survey.tally);
+  Json facts = page_facts(recording, source.cloth, survey.tally);
   if (!source.facts.empty()) {
     const Json measured{{"group", "Measured"}, {"rows", source.facts}};
     facts.insert(facts.begin(), measured);
@@ -180,7 +201,7 @@ Json recording_json(const Source& source) {
           {"low_m", survey.low},
           {"high_m", survey.high},
           {"stats", recording.header().format().stats() ? stats_json(survey.stats) : Json()},
-          {"sheets", sheets_json(recording)},
+          {"sheets", sheets_json(recording, source.cloth)},
           {"colliders", colliders_json(recording.scene())},
           {"gravity_m_per_s2",
            to_json(recording.scene().environment().gravity_m_per_s2(), Defaults::kLeftOut)},

@@ -49,5 +49,7 @@ std::string live_page();
 
 // The colours of a page's numbers, from the least to the largest: "#3288bd" ...
 std::vector<std::string_view> page_ramp();
+// Of those around 0.
+std::vector<std::string_view> page_balance();
 
 }  // namespace weft::client

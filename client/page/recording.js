@@ -5,10 +5,7 @@ const page = JSON.parse($('page').textContent);
 const kSameTime = 1e-9;
 
 async function inflate(id) {
-  const text = atob($(id).textContent.trim());
-  const packed = new Uint8Array(text.length);
-  for (let i = 0; i < text.length; ++i) packed[i] = text.charCodeAt(i);
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
+  const stream = new Blob([bytesOf($(id).textContent.trim())]).stream().pipeThrough(new DecompressionStream('deflate'));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
@@ -46,6 +43,7 @@ class Recording {
     Object.assign(this, facts);
     this.numbers = numbers;
     this.values = 3 * this.particles;
+    this.cloth = new Cloth(this.sheets, this.particles);
     this.most = {};  // largest value of a quantity over all frames
   }
 
@@ -86,7 +84,7 @@ class Recording {
       for (let frame = 0; frame < this.time_s.length; ++frame) {
         this.write(positions, {frame, next: frame, share: 0});
         kQuantities[quantity].write(this, values, positions, frame);
-        for (const value of values) if (value > this.most[quantity]) this.most[quantity] = value;
+        this.most[quantity] = largestOf(values, this.most[quantity]);
       }
     }
     return this.most[quantity];

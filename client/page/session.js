@@ -71,16 +71,21 @@ class Sight {
     this.uid = uid;
     this.sheets = sheets.map((layout, k) => ({
       ...layout,
-      spacing_m: scene.sheets[k].grid.spacing_m,
+      spacing_m: scene.sheets[k].grid?.spacing_m,
       pinned: scene.sheets[k].pins.flatMap(({particles}) => particles),
       get textile() { return scene.sheets[k].textile; },  // as it is now
     }));
-    this.particles = this.sheets.reduce((sum, {rows, columns}) => sum + rows * columns, 0);
+    this.particles = this.sheets.reduce((sum, sheet) => sum + particlesOf(sheet), 0);
     this.colliders = scene.colliders;
     this.gravity_m_per_s2 = scene.environment.gravity_m_per_s2;
     this.origin_m = [0, 0, 0];
-    this.most = {strain: 0, speed: 0, bending: 0};  // so far
+    this.most = {};  // largest value of a quantity so far
   }
+
+  // The triangles of a sheet, which come before the frames where it is no grid.
+  layOut({sheet, mesh}) { this.sheets[sheet].mesh = mesh; }
+
+  get cloth() { return this.made ??= new Cloth(this.sheets, this.particles); }
 
   take({frame, positions}) {
     this.before = this.frame;
@@ -88,7 +93,7 @@ class Sight {
   }
 
   sheetOf(particle) {
-    return this.sheets.find(({first_particle, rows, columns}) => particle < first_particle + rows * columns);
+    return this.sheets.find((sheet) => particle < sheet.first_particle + particlesOf(sheet));
   }
 
   place() { return {frame: this.frame.number}; }
@@ -114,7 +119,7 @@ class Sight {
   }
 
   largest(quantity, values) {
-    this.most[quantity] = values.reduce((a, b) => Math.max(a, b), this.most[quantity]);
+    this.most[quantity] = largestOf(values, this.most[quantity]);
     return this.most[quantity];
   }
 
@@ -126,8 +131,7 @@ class Sight {
       positions[i], positions[this.particles + i], positions[2 * this.particles + i]);
     for (let i = 0; i < this.particles; ++i) box.expandByPoint(at(i));
     const down = vector(this.gravity_m_per_s2).normalize();
-    for (const {first_particle, rows, columns, spacing_m, pinned} of this.sheets) {
-      const reach = spacing_m * Math.max(rows, columns);
+    for (const {sheet: {first_particle, pinned}, reach} of this.cloth.parts) {
       for (const i of pinned) box.expandByPoint(at(first_particle + i).addScaledVector(down, reach));
     }
     return box;

@@ -59,7 +59,8 @@ class Stage {
     this.up = gravity.length() > 0 ? gravity.negate().normalize() : new THREE.Vector3(0, 1, 0);
     this.box = this.boxOf(sources);
     this.panes = sources.map((source) => new Pane(source, this.box, this.up));
-    for (const pane of this.panes) pane.lattice.visible = isPressed($('lattice'));
+    for (const pane of this.panes) pane.lines.visible = isPressed($('lines'));
+    this.namePanels();
     this.layOut();
     this.makeCamera();
   }
@@ -190,18 +191,39 @@ class Stage {
 
   // One scale for all panes, so that equal colours are equal values.
   colour() {
+    const known = kQuantities[this.quantity];
     $('legend').hidden = !this.quantity;
+    $('panels').hidden = !this.quantity || known;
+    for (const id of ['scale', 'now-label']) $(id).hidden = !known;
+    $('quantity').textContent = known?.title ?? 'Panels';
     let most = 0;
-    if (this.quantity) {
+    if (known) {
       for (const {source, values} of this.panes) {
-        const largest = $('now').checked ? values.reduce((a, b) => Math.max(a, b), 0)
-          : source.largest(this.quantity, values);
-        most = Math.max(most, largest);
+        most = Math.max(most, $('now').checked ? largestOf(values) : source.largest(this.quantity, values));
       }
-      $('quantity').textContent = kQuantities[this.quantity].title;
-      $('most').textContent = kQuantities[this.quantity].text(most);
+      $('ramp').style.background = `linear-gradient(90deg, ${(known.balanced ? kBalance : kRamp).join(', ')})`;
+      $('least').textContent = known.balanced ? `−${known.text(most)}` : '0';
+      $('most').textContent = known.text(most);
     }
     for (const pane of this.panes) pane.colourBy(this.quantity, most);
+  }
+
+  // Equal names have equal colours in all panes.
+  namePanels() {
+    const names = [...new Set(this.panes.flatMap(({source}) => source.cloth.panels.map(({name}) => name)))];
+    const colours = new Map(names.map((name, k) => [name, kPanels[k % kPanels.length]]));
+    for (const pane of this.panes) pane.paintPanels(colours);
+    $('panels').replaceChildren(...names.map((name) => {
+      const item = cell('li', name);
+      item.style.setProperty('--swatch', colours.get(name));
+      return item;
+    }));
+    const option = $('colour').querySelector('[value=panels]');
+    option.hidden = option.disabled = names.length < 2;
+    if (option.disabled && this.quantity === 'panels') {
+      $('colour').value = 'cloth';
+      this.quantity = '';
+    }
   }
 
   paint() {
@@ -209,10 +231,10 @@ class Stage {
     this.stale = true;
   }
 
-  toggleLattice() {
-    const shown = !isPressed($('lattice'));
-    $('lattice').setAttribute('aria-pressed', shown);
-    for (const pane of this.panes) pane.lattice.visible = shown;
+  toggleLines() {
+    const shown = !isPressed($('lines'));
+    $('lines').setAttribute('aria-pressed', shown);
+    for (const pane of this.panes) pane.lines.visible = shown;
     this.stale = true;
   }
 
@@ -229,17 +251,19 @@ class Stage {
       this.stale = true;
     };
     const nextColour = () => {
-      $('colour').selectedIndex = ($('colour').selectedIndex + 1) % $('colour').length;
+      const {options, selectedIndex} = $('colour');
+      const order = [...options].slice(selectedIndex + 1).concat(...options);
+      $('colour').selectedIndex = order.find(({disabled}) => !disabled).index;
       colour();
     };
     $('colour').addEventListener('change', colour);
     $('now').addEventListener('change', () => { this.stale = true; });
-    $('lattice').addEventListener('click', () => this.toggleLattice());
+    $('lines').addEventListener('click', () => this.toggleLines());
     $('fit').addEventListener('click', () => this.fit());
     $('theme').addEventListener('click', () => this.toggleTheme());
 
     const keys = {
-      f: () => this.fit(), l: () => this.toggleLattice(), t: () => this.toggleTheme(), c: nextColour,
+      f: () => this.fit(), l: () => this.toggleLines(), t: () => this.toggleTheme(), c: nextColour,
       w: () => this.turn(0, -0.1), s: () => this.turn(0, 0.1),
       a: () => this.turn(-0.1, 0), d: () => this.turn(0.1, 0),
       '+': () => this.turn(0, 0, 0.9), '=': () => this.turn(0, 0, 0.9), '-': () => this.turn(0, 0, 1.1),
@@ -259,7 +283,6 @@ class Stage {
 
 // The stage of a page, in the colours of the person; none where the browser cannot draw.
 function makeStage(Kind) {
-  $('ramp').style.background = `linear-gradient(90deg, ${kRamp.join(', ')})`;
   document.documentElement.dataset.theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';
   try {
     return new Kind();

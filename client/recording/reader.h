@@ -4,7 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "client/assets.h"
 #include "client/recording/database.h"
+#include "client/sheet_layout.h"
 #include "weft/v1/frame.pb.h"
 #include "weft/v1/scene.pb.h"
 
@@ -19,6 +21,8 @@ class RecordingReader {
   const std::string& path() const { return path_; }
   const v1::Scene& scene() const { return scene_; }
   const v1::StreamHeader& header() const { return header_; }
+  // Sound; see meshes_of().
+  const Topology& topology() const { return topology_; }
   const std::string& recorded_at() const { return recorded_at_; }
 
   // It holds every frame from first_frame() to last_frame(); one less where there is none.
@@ -31,14 +35,19 @@ class RecordingReader {
   v1::Frame read(std::int64_t number);
   // The two frames around a time, (number, time); one at either end.
   std::vector<std::pair<std::int64_t, double>> find_around(double time_s);
+  // Those that the scene names, as far as the file has them.
+  Assets assets();
   // What is wrong with the file itself, if anything.
   std::vector<std::string> find_damage();
 
  private:
+  void read_topology(std::int64_t version);
+
   std::string path_;
   Database database_;
   v1::Scene scene_;
   v1::StreamHeader header_;
+  Topology topology_;
   std::string recorded_at_;
   std::int64_t last_frame_ = 0;
 };

@@ -131,6 +131,7 @@ Survey survey_of(std::vector<RecordingReader>& recordings,
   Survey survey;
   Studio& studio = survey.studio;
   studio.colouring = order.colouring;
+  if (const ColourScale* scale = scale_of(order.colouring)) studio.balanced = scale->balanced;
   studio.directions = directions_of(
       vector_of(recordings.front().scene().environment().gravity_m_per_s2()), order.outlook);
   CameraFit fit(studio.directions, order.outlook,
@@ -151,7 +152,7 @@ Survey survey_of(std::vector<RecordingReader>& recordings,
         for (std::size_t k = 0; k < points.x.size(); ++k)
           show({{points.x[k], points.y[k], points.z[k]}, 0});
         for (const float value : surface.values)
-          studio.most = std::max(studio.most, static_cast<double>(value));
+          studio.most = std::max(studio.most, std::abs(static_cast<double>(value)));
       }
       for (const Body& body : stage.bodies) hulls.push_back(hull_of(body));
     }
@@ -192,9 +193,9 @@ void draw_legend(Picture& picture, const ColourScale& scale, double largest, con
   write_within(picture, title, text, left, bottom - 2.1F * text, width, kInk);
   for (int y = static_cast<int>(bottom - 1.7F * text); y < static_cast<int>(bottom - text); ++y) {
     for (int x = static_cast<int>(left); x < static_cast<int>(right); ++x)
-      picture.cover(x, y, ramp_colour((static_cast<float>(x) - left) / width), 1);
+      picture.cover(x, y, ramp_colour((static_cast<float>(x) - left) / width, scale.balanced), 1);
   }
-  write_text(picture, "0", text, left, bottom, kQuietInk);
+  write_text(picture, scale.balanced ? scale.text(-largest) : "0", text, left, bottom, kQuietInk);
   write_text(picture, most, text, right - text_width(most, text), bottom, kQuietInk);
 }
 
@@ -203,6 +204,12 @@ void draw_legend(Picture& picture, const ColourScale& scale, double largest, con
 const ColourScale* scale_of(Colouring colouring) {
   static constexpr ColourScale kStrain{"strain", "strain, largest at a particle", "largest_strain",
                                        percent_text};
+  static constexpr ColourScale kWarp{"warp strain", "strain along the warp", "largest_warp_strain",
+                                     percent_text, true};
+  static constexpr ColourScale kWeft{"weft strain", "strain along the weft", "largest_weft_strain",
+                                     percent_text, true};
+  static constexpr ColourScale kShear{"shear", "shear, sine of its angle", "largest_shear",
+                                      percent_text, true};
   static constexpr ColourScale kSpeed{"speed", "speed", "largest_speed_m_per_s",
                                       [](double value) { return number_text(value) + " m/s"; }};
   static constexpr ColourScale kBending{"bending energy", "bending energy",
@@ -210,9 +217,16 @@ const ColourScale* scale_of(Colouring colouring) {
                                         [](double value) { return number_text(value) + " J/m²"; }};
   switch (colouring) {
     case Colouring::kCloth:
+    case Colouring::kPanels:
       break;
     case Colouring::kStrain:
       return &kStrain;
+    case Colouring::kWarp:
+      return &kWarp;
+    case Colouring::kWeft:
+      return &kWeft;
+    case Colouring::kShear:
+      return &kShear;
     case Colouring::kSpeed:
       return &kSpeed;
     case Colouring::kBending:

@@ -38,8 +38,9 @@ struct ColourScale {
   const char* title;  // in a picture
   const char* field;  // the largest, in JSON
   std::string (*text)(double value);
+  bool balanced = false;  // around 0, else from 0 on
 };
-// None of cloth.
+// None of cloth and panels.
 const ColourScale* scale_of(Colouring colouring);
 
 struct RenderResult {

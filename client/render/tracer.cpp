@@ -46,7 +46,7 @@ struct Tints {
   Colour front, back;
 };
 
-// Of the sheets, in turn.
+// Of the sheets, or of the panels, in turn.
 const std::array kTints{Tints{colour_of("#c8553d"), colour_of("#e3b7a0")},
                         Tints{colour_of("#2f6f9f"), colour_of("#a9c6d8")},
                         Tints{colour_of("#4b8b5a"), colour_of("#b9d3b6")},
@@ -122,12 +122,15 @@ Colour mix(const Colour& a, const Colour& b, float share) { return a + share * (
 
 }  // namespace
 
-Colour ramp_colour(float share) {
-  static const std::vector<Colour> ramp = [] {
+Colour ramp_colour(float share, bool balanced) {
+  const auto colours_of = [](const std::vector<std::string_view>& names) {
     std::vector<Colour> colours;
-    for (const std::string_view hex : page_ramp()) colours.push_back(colour_of(hex));
+    for (const std::string_view hex : names) colours.push_back(colour_of(hex));
     return colours;
-  }();
+  };
+  static const std::vector<Colour> from_nought = colours_of(page_ramp());
+  static const std::vector<Colour> around_nought = colours_of(page_balance());
+  const std::vector<Colour>& ramp = balanced ? around_nought : from_nought;
   const float place = std::clamp(share, 0.0F, 1.0F) * static_cast<float>(ramp.size() - 1);
   const auto from = std::min(static_cast<std::size_t>(place), ramp.size() - 2);
   return mix(ramp[from], ramp[from + 1], place - static_cast<float>(from));
@@ -345,10 +348,15 @@ class Tracer::Rays {
       face = -face;
       normal = -normal;
     }
-    const Tints& tints = kTints[hit.geomID % kTints.size()];
+    const bool by_panel = studio_.colouring == Colouring::kPanels;
+    const std::size_t tinted =
+        by_panel ? static_cast<std::size_t>(surface.panels[hit.primID]) : hit.geomID;
+    const Tints& tints = kTints[tinted % kTints.size()];
     Colour tint = front ? tints.front : tints.back;
-    if (studio_.colouring != Colouring::kCloth)
-      tint = ramp_colour(studio_.most > 0 ? value / static_cast<float>(studio_.most) : 0);
+    if (!by_panel && studio_.colouring != Colouring::kCloth) {
+      const float share = studio_.most > 0 ? value / static_cast<float>(studio_.most) : 0;
+      tint = ramp_colour(studio_.balanced ? (1 + share) / 2 : share, studio_.balanced);
+    }
     // fibres that stand out catch light at a glancing view
     const float glance = 1 - std::abs(normal.dot(direction));
     const float fuzz = 0.10F * glance * glance * glance;

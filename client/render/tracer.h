@@ -19,7 +19,8 @@ struct Studio {
   HalfSpace ground;        // where the scene has no plane of its own
 
   Colouring colouring = Colouring::kCloth;
-  double most = 0;  // value of the colour at the end of the ramp
+  double most = 0;        // value of the colour at the end of the ramp
+  bool balanced = false;  // whether the ramp begins at -most, else at 0
 };
 
 // A part of a picture, pixels.
@@ -43,7 +44,7 @@ class Tracer {
   std::unique_ptr<Rays> rays_;
 };
 
-// The colour of a share of the ramp, 0 to 1.
-Colour ramp_colour(float share);
+// The colour of a share of a ramp, 0 to 1: of the one from 0 on, or of that around 0.
+Colour ramp_colour(float share, bool balanced);
 
 }  // namespace weft::client

@@ -81,7 +81,7 @@ Simulation asleep() {
 // A curtain of triangles that swings, of cotton.
 Scene draped() {
   SheetDefinition sheet;
-  sheet.shape = complete(testing::triangle_mesh(testing::scattered(31, 0.01)));
+  sheet.shape = complete(triangle_mesh(testing::scattered(31, 0.01)));
   sheet.textile = {MeasuredTextile{.areal_density = 0.15,
                                    .tensile_warp = 100,
                                    .tensile_weft = 100,

@@ -11,7 +11,8 @@ function bytesOf(base64) {
 const particlesOf = ({rows, columns, particle_count}) => rows * columns || particle_count;
 
 // What a sheet has: its triangles, their two sides from the first corner along warp and weft where the sheet is
-// flat, panels as runs of triangles, lines to be drawn, and how far it reaches. Both kinds below have these.
+// flat, panels as runs of triangles, lines to be drawn as pairs of particles, and how far it reaches. Both kinds
+// below have these.
 
 // Two triangles of each cell; the lines are its rows and columns.
 class Lattice {
@@ -113,7 +114,8 @@ class Mesh {
 class Cloth {
   constructor(sheets, particles) {
     this.parts = sheets.map((sheet) => (sheet.mesh ? new Mesh(sheet) : new Lattice(sheet)));
-    this.lines = this.parts.flatMap(({lines}) => lines);
+    this.threads = this.parts.flatMap((part) => (part instanceof Lattice ? part.lines : []));
+    this.edges = this.parts.flatMap((part) => (part instanceof Mesh ? part.lines : []));
     this.pins = sheets.flatMap(({first_particle, pinned}) => pinned.map((i) => first_particle + i));
     const count = this.parts.reduce((sum, {triangles}) => sum + triangles.length / 3, 0);
     this.triangles = new Uint32Array(3 * count);

@@ -3,8 +3,8 @@
 
 const kRamp = ['#3288bd', '#66c2a5', '#abdda4', '#e6f598', '#fee08b', '#fdae61', '#f46d43', '#d53e4f',
   '#9e0142'];  // ColorBrewer's Spectral
-const kBalance = ['#2166ac', '#67a9cf', '#d1e5f0', '#f7f7f7', '#fddbc7', '#ef8a62', '#b2182b'];  // and RdBu
-const kPanels = ['#66c2a5', '#fc8d62', '#8da0cb', '#e78ac3', '#a6d854', '#ffd92f', '#e5c494', '#b3b3b3'];  // and Set2
+const kBalance = ['#3b4cc0', '#6f92f3', '#aac7fd', '#dddddd', '#f7b89c', '#e7745b', '#b40426'];  // Moreland's cool to warm
+const kPanels = ['#66c2a5', '#fc8d62', '#8da0cb', '#e78ac3', '#a6d854', '#ffd92f', '#e5c494', '#b3b3b3'];  // ColorBrewer's Set2
 
 const vector = (given) => new THREE.Vector3(given?.x ?? 0, given?.y ?? 0, given?.z ?? 0);
 const linear = (colour) => new THREE.Color(colour).convertSRGBToLinear();
@@ -196,15 +196,17 @@ class Pane {
       mesh.castShadow = mesh.receiveShadow = true;
       this.cloth.add(mesh);
     }
-    this.lines = new THREE.LineSegments(geometry(cloth.lines),
-      new THREE.LineBasicMaterial({transparent: true, opacity: 0.25}));
+    this.lines = new THREE.Group();
+    for (const [lines, opacity] of [[cloth.threads, 0.25], [cloth.edges, 0.7]]) {
+      this.lines.add(new THREE.LineSegments(geometry(lines), new THREE.LineBasicMaterial({transparent: true, opacity})));
+    }
     this.lines.visible = false;
     this.pins = new THREE.Points(geometry(cloth.pins), dots(8));
     this.held = new THREE.Points(geometry([0]), dots(16));
     this.held.material.depthTest = false;  // seen through folds
     this.held.visible = false;
     this.cloth.add(this.lines, this.pins, this.held);
-    for (const child of this.cloth.children) child.frustumCulled = false;  // its bounds change with every frame
+    this.cloth.traverse((child) => { child.frustumCulled = false; });  // its bounds change with every frame
     this.scene.add(this.cloth);
   }
 
@@ -259,7 +261,7 @@ class Pane {
     this.faces[1].plain.color.copy(linear(style('--cloth-back')));
     this.bodyMaterial.color.copy(linear(style('--body')));
     this.grid.material.color.copy(linear(style('--grid')));
-    this.lines.material.color.copy(linear(style('--lines')));
+    for (const {material} of this.lines.children) material.color.copy(linear(style('--lines')));
     for (const {material} of [this.pins, this.held]) material.color.copy(linear(style('--accent')));
   }
 

@@ -50,6 +50,7 @@ Rows shape_rows(const v1::SheetLayout& layout, const ClothMesh& mesh) {
     if (panel.grain_rad != 0)
       text += fmt::format(", grain {}°", number_text(panel.grain_rad * 180 / std::numbers::pi));
     if (panel.own_textile) text += ", textile of its own";
+    if (!panel.preset.empty()) text += ", textile " + panel.preset;
     panels.emplace_back("panel " + panel.name, std::move(text));
   }
   Rows rows{{"particles", std::to_string(layout.particle_count())},

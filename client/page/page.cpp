@@ -121,27 +121,38 @@ Json stats_json(const std::vector<v1::FrameStats>& stats) {
   return json;
 }
 
-// A grid in few numbers, a mesh as it was streamed; client/page/cloth.js makes triangles of both.
-Json sheets_json(const RecordingReader& recording) {
+// A mesh as it was streamed, without what is nothing, and the panels' own textiles.
+Json mesh_json(v1::MeshData mesh, const ClothMesh& cloth) {
+  for (int p = 0; p < mesh.panels_size(); ++p) {
+    const ClothPanel& panel = cloth.panels[static_cast<std::size_t>(p)];
+    if (panel.own_textile) *mesh.mutable_panels(p)->mutable_textile() = panel.textile;
+  }
+  return to_json(mesh, Defaults::kLeftOut);
+}
+
+// client/page/cloth.js makes triangles of both kinds.
+Json sheets_json(const RecordingReader& recording, const std::vector<ClothMesh>& cloth) {
   Json sheets = Json::array();
   for (int i = 0; i < recording.header().sheets_size(); ++i) {
     const v1::SheetLayout& layout = recording.header().sheets(i);
     const v1::Sheet& sheet = recording.scene().sheets(i);
+    const auto s = static_cast<std::size_t>(i);
     Json pinned = Json::array();
     for (const auto& pin : sheet.pins())
       for (const int particle : pin.particles()) pinned.push_back(particle);
-    Json& json = sheets.emplace_back(
-        Json{{"name", layout.name()}, {"first_particle", layout.first_particle()}});
+    Json json{{"name", layout.name()},
+              {"first_particle", layout.first_particle()},
+              {"pinned", std::move(pinned)},
+              {"textile", to_json(sheet.textile())}};
     if (is_grid(layout)) {
       json["rows"] = layout.rows();
       json["columns"] = layout.columns();
-      json["spacing_m"] = sheet.grid().spacing_m();
+      json["spacing_m"] = cloth[s].spacing_m;
     } else {
       json["particle_count"] = layout.particle_count();
-      json["mesh"] = to_json(recording.topology()[static_cast<std::size_t>(i)], Defaults::kLeftOut);
+      json["mesh"] = mesh_json(recording.topology()[s], cloth[s]);
     }
-    json["pinned"] = std::move(pinned);
-    json["textile"] = to_json(sheet.textile());
+    sheets.push_back(std::move(json));
   }
   return sheets;
 }
@@ -190,7 +201,7 @@ Json recording_json(const Source& source) {
           {"low_m", survey.low},
           {"high_m", survey.high},
           {"stats", recording.header().format().stats() ? stats_json(survey.stats) : Json()},
-          {"sheets", sheets_json(recording)},
+          {"sheets", sheets_json(recording, source.cloth)},
           {"colliders", colliders_json(recording.scene())},
           {"gravity_m_per_s2",
            to_json(recording.scene().environment().gravity_m_per_s2(), Defaults::kLeftOut)},

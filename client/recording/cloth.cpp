@@ -47,6 +47,19 @@ double median_edge(const ClothMesh& mesh) {
   return *middle;
 }
 
+// Of the panels that have their own, as the asset of the mesh says.
+void take_textiles(ClothMesh& mesh, const std::string& asset) {
+  v1::MeshData data;
+  if (!data.ParseFromString(asset)) return;
+  for (int p = 0; p < data.panels_size() && p < static_cast<int>(mesh.panels.size()); ++p) {
+    const v1::Textile& textile = data.panels(p).textile();
+    ClothPanel& panel = mesh.panels[static_cast<std::size_t>(p)];
+    panel.preset = textile.preset();
+    panel.own_textile = textile.has_measured();
+    if (panel.own_textile) panel.textile = textile;
+  }
+}
+
 Vector3d corner(const Points& points, const Triangle& triangle, std::size_t k) {
   const auto i = static_cast<std::size_t>(triangle[k]);
   return {points.x[i], points.y[i], points.z[i]};
@@ -107,36 +120,36 @@ double energy_of(const Slopes& threads, const Slopes& turns, const v1::MeasuredT
 
 }  // namespace
 
-std::vector<ClothMesh> cloth_of(const RecordingReader& recording) {
+std::vector<ClothMesh> cloth_of(RecordingReader& recording) {
   std::vector<ClothMesh> cloth;
   const auto meshes = meshes_of(recording.header(), recording.topology());
+  const Assets assets = recording.assets();
   for (std::size_t s = 0; s < meshes.size(); ++s) {
     const SheetMesh& from = meshes[s];
     const v1::Sheet& sheet = recording.scene().sheets(static_cast<int>(s));
     ClothMesh& mesh = cloth.emplace_back();
     mesh.triangles = from.triangles;
-    for (std::size_t p = 0; p < from.panels.size(); ++p) {
-      const PanelRun& run = from.panels[p];
-      ClothPanel& panel = mesh.panels.emplace_back(ClothPanel{
-          .name = run.name, .first = run.first, .count = run.count, .textile = sheet.textile()});
-      if (is_grid(from.layout)) {
-        mesh.spacing_m = sheet.grid().spacing_m();
-        lay_flat(mesh, run.first, run.count, [&](std::size_t t, std::size_t k) -> Vector2d {
-          const auto [row, column] = place_in(from.layout, from.triangles[t][k]);
-          return {mesh.spacing_m * column, mesh.spacing_m * row};
-        });
-        continue;
-      }
-      const v1::MeshData& streamed = recording.topology()[s];
-      if (static_cast<int>(p) < streamed.panels_size())
-        panel.grain_rad = streamed.panels(static_cast<int>(p)).grain_rad();
+    for (const PanelRun& run : from.panels)
+      mesh.panels.push_back(
+          {run.name, run.first, run.count, run.grain_rad, {}, false, sheet.textile()});
+    if (is_grid(from.layout)) {
+      mesh.spacing_m = sheet.grid().spacing_m();
+      lay_flat(mesh, 0, mesh.triangles.size(), [&](std::size_t t, std::size_t k) -> Vector2d {
+        const auto [row, column] = place_in(from.layout, from.triangles[t][k]);
+        return {mesh.spacing_m * column, mesh.spacing_m * row};
+      });
+      continue;
+    }
+    for (const ClothPanel& panel : mesh.panels) {
       const double sine = std::sin(panel.grain_rad), cosine = std::cos(panel.grain_rad);
-      lay_flat(mesh, run.first, run.count, [&](std::size_t t, std::size_t k) -> Vector2d {
+      lay_flat(mesh, panel.first, panel.count, [&](std::size_t t, std::size_t k) -> Vector2d {
         const auto [u, v] = from.flat[static_cast<std::size_t>(from.flat_triangles[t][k])];
         return {cosine * v - sine * u, -cosine * u - sine * v};
       });
     }
-    if (!is_grid(from.layout)) mesh.spacing_m = median_edge(mesh);
+    mesh.spacing_m = median_edge(mesh);
+    if (const auto asset = assets.find(sheet.triangles().asset()); asset != assets.end())
+      take_textiles(mesh, asset->second);
   }
   return cloth;
 }

@@ -17,18 +17,19 @@ struct ClothPanel {
   std::string name;
   std::size_t first = 0, count = 0;  // triangles
   double grain_rad = 0;
+  std::string preset{};  // its own textile, where its name is all that is known
   bool own_textile = false;
   v1::Textile textile{};  // the sheet's where it has no own
 };
 
-// A sheet of a recording as triangles, grids too.
+// A sheet of a recording as triangles, grids too, with the textiles it had at the start.
 struct ClothMesh {
   std::vector<Triangle> triangles;  // particles, counted from the sheet's first
   std::vector<FlatSides> sides;     // of each
   std::vector<ClothPanel> panels;   // together all
   double spacing_m = 0;             // of a grid, else the median edge where it is flat
 };
-std::vector<ClothMesh> cloth_of(const RecordingReader& recording);
+std::vector<ClothMesh> cloth_of(RecordingReader& recording);
 
 // Of a panel where it is flat, m^2.
 double area_of(const ClothMesh& mesh, const ClothPanel& panel);

@@ -219,57 +219,59 @@ void hang_over(const MeasuredTextile& textile, const LabOrder& order, double ove
   report.curves.push_back(std::move(curve));
 }
 
-// Half of a strip that hangs over an edge on both sides, alike, so that it is level there: no clamp
-// cuts through the curvatures that are fitted.
-RestShape mirrored(const RestShape& half) {
-  std::vector<Vector2d> points = points_of(half);
-  std::vector<std::array<int, 3>> triangles = half.triangles;
-  std::vector<int> image;
-  for (int i = 0; i < half.particles; ++i) {
-    const Vector2d point = points[static_cast<std::size_t>(i)];
-    image.push_back(point.x() == 0 ? i : static_cast<int>(points.size()));
-    if (point.x() != 0) points.emplace_back(-point.x(), point.y());
+// Two equal strips, joined by a column of squares across the edge that they hang over, so that no
+// clamp cuts through the curvatures that are fitted.
+RestShape double_strip(const RestShape& strip, double gap) {
+  const std::vector<Vector2d> half = points_of(strip);
+  std::vector<Vector2d> points;
+  for (const double side : {1, -1})
+    for (const Vector2d& point : half) points.emplace_back(side * (point.x() + gap / 2), point.y());
+  std::vector<std::array<int, 3>> triangles = strip.triangles;
+  const int n = strip.particles;
+  for (const auto& [a, b, c] : strip.triangles) triangles.push_back({b + n, a + n, c + n});
+  std::vector<int> end;
+  for (int i = 0; i < n; ++i)
+    if (half[static_cast<std::size_t>(i)].x() == 0) end.push_back(i);
+  for (std::size_t k = 0; k + 1 < end.size(); ++k) {
+    triangles.push_back({end[k] + n, end[k], end[k + 1]});
+    triangles.push_back({end[k] + n, end[k + 1], end[k + 1] + n});
   }
-  for (const auto& [a, b, c] : half.triangles)
-    triangles.push_back({image[static_cast<std::size_t>(b)], image[static_cast<std::size_t>(a)],
-                         image[static_cast<std::size_t>(c)]});
   return rest_shape(points, triangles);
 }
 
 void hang_on_both_sides(const LabOrder& order, double overhang, int columns,
                         const std::stop_token& stop, LabReport& report) {
   const MeasuredTextile textile = along_warp(order);
-  const double spacing = overhang / columns;
+  const double step = overhang / (columns + 0.5), spacing = step / column_step(*order.mesh);
   constexpr int kMostRows = 12;
   const double width = spacing * std::min(steps_of(kWidth, spacing), kMostRows);
-  Specimen strip = cut(textile, order.bending,
-                       mirrored(cut_rectangle(*order.mesh, overhang, width, spacing)), spacing);
-  strip.hold_at(0);
+  const RestShape half = cut_rectangle(*order.mesh, columns * step, width, spacing);
+  Specimen strip = cut(textile, order.bending, double_strip(half, step), spacing);
+
+  // from the elastica's own shape
   constexpr int kFine = 1000;
   const Eigen::Matrix2Xd shape = overhang * heavy_elastica(kCantileverQ, kFine + 1);
   const Matrix3Xd flat = strip.start;
-  Eigen::Index tip = 0;
-  std::vector<Eigen::Index> middle;  // particles of the middle of one side
+  std::vector<Eigen::Index> middle;  // particles, of one side
   for (Eigen::Index i = 0; i < flat.cols(); ++i) {
-    const double along = flat(0, i);
-    const auto at = static_cast<Eigen::Index>(std::lround(std::abs(along) / overhang * kFine));
-    strip.start(0, i) = std::copysign(shape(0, at), along);
-    strip.start(1, i) = -shape(1, at);
-    const auto off = [&](Eigen::Index k) {
-      return std::abs(flat(2, k) - width / 2) + 10 * (overhang - flat(0, k));
-    };
-    if (off(i) < off(tip)) tip = i;
-    if (along >= 0 && std::abs(flat(2, i) - width / 2) < 0.51 * spacing) middle.push_back(i);
+    const double along = std::abs(flat(0, i)), off = std::abs(flat(2, i) - width / 2);
+    strip.held[i] = along < 0.6 * step ? 1 : 0;
+    const auto at = static_cast<Eigen::Index>(std::lround(along / overhang * kFine));
+    if (strip.held[i] == 0)
+      strip.start.col(i).head<2>() =
+          Eigen::Vector2d(std::copysign(shape(0, at), flat(0, i)), -shape(1, at));
+    if (flat(0, i) >= 0 && off < 0.51 * spacing) middle.push_back(i);
   }
+  std::sort(middle.begin(), middle.end(),
+            [&](Eigen::Index a, Eigen::Index b) { return flat(0, a) < flat(0, b); });
   const double tolerance = 1e-5 * textile.areal_density * spacing * spacing * kStandardGravity;
   const Equilibrium rest = find_equilibrium(strip.mesh, strip.held, {0, -kStandardGravity, 0},
                                             strip.start, tolerance, stop);
   note_unsettled(rest, tolerance, report);
+  const Vector3d tip = rest.x.col(middle.back());
   report.values.push_back(value("chord angle", "degrees", strip,
                                 chord_angle(shape(0, kFine), shape(1, kFine)),
-                                chord_angle(rest.x(0, tip), -rest.x(1, tip))));
-  std::sort(middle.begin(), middle.end(),
-            [&](Eigen::Index a, Eigen::Index b) { return flat(0, a) < flat(0, b); });
+                                chord_angle(tip.x(), -tip.y())));
   LabCurve curve{join("spacing ", 1000 * spacing, " mm"), {"x m", "drop m"}, {}};
   for (const Eigen::Index i : middle) curve.rows.push_back({rest.x(0, i), -rest.x(1, i)});
   report.curves.push_back(std::move(curve));
@@ -287,8 +289,8 @@ std::vector<int> cantilever_columns(const LabOrder& order, double overhang) {
   const double finest = std::max(0.001, overhang / (isometric ? 60 : 12));
   std::vector<int> columns;
   const auto add = [&](double spacing) {
-    const double beyond = order.mesh ? 0 : 0.5;  // spacings from the edge to the first column
-    const int count = std::max(1, static_cast<int>(std::lround(overhang / spacing - beyond)));
+    const double step = spacing * (order.mesh ? column_step(*order.mesh) : 1);
+    const int count = std::max(1, static_cast<int>(std::lround(overhang / step - 0.5)));
     if (std::find(columns.begin(), columns.end(), count) == columns.end()) columns.push_back(count);
   };
   if (!order.spacings.empty()) {
@@ -308,8 +310,8 @@ LabReport cantilever(const LabOrder& order, const LabWatch& watch) {
       "ASTM D1388: a strip over an edge, of the overhang (8 B / w)^(1/3) = ", 1000 * overhang,
       " mm that its bending rigidity and weight call for. Asked: the angle of the chord from edge "
       "to tip by the heavy elastica, without stretch. ",
-      order.mesh ? "It hangs on both sides of the edge, alike, so that it is level there; the "
-                   "spacing divides the overhang."
+      order.mesh ? "It hangs alike on both sides of the edge and is held half a spacing from it; "
+                   "the spacing divides the overhang."
                  : "The edge lies half a spacing inside the last column held, and the spacing "
                    "divides the overhang.");
   for_each_specimen(cantilever_columns(order, overhang), watch, [&](int columns) {

@@ -23,12 +23,12 @@ struct Edge {
   double reach_angle;
 };
 
-struct Side {
+struct EdgeSide {
   int low, high, triangle, corner;  // corner: opposite to the edge
 };
 
 std::vector<Edge> edges_with_triangles(const RestShape& shape) {
-  std::vector<Side> sides;
+  std::vector<EdgeSide> sides;
   sides.reserve(3 * shape.triangles.size());
   for (std::size_t t = 0; t < shape.triangles.size(); ++t)
     for (int k = 0; k < 3; ++k) {
@@ -36,12 +36,12 @@ std::vector<Edge> edges_with_triangles(const RestShape& shape) {
                                       shape.triangles[t][static_cast<std::size_t>((k + 2) % 3)]);
       sides.push_back({i, j, static_cast<int>(t), k});
     }
-  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+  std::sort(sides.begin(), sides.end(), [](const EdgeSide& a, const EdgeSide& b) {
     return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
   });
 
   // (u, v) of the edge's ends, low and high, and of the corner opposite to it
-  const auto points = [&](const Side& side) {
+  const auto points = [&](const EdgeSide& side) {
     const auto t = static_cast<std::size_t>(side.triangle);
     const auto at = [&](int k) { return static_cast<std::size_t>((side.corner + k) % 3); };
     const bool rises = shape.triangles[t][at(1)] == side.low;
@@ -55,14 +55,14 @@ std::vector<Edge> edges_with_triangles(const RestShape& shape) {
   };
   std::vector<Edge> edges;
   for (std::size_t s = 0; s < sides.size(); ++s) {
-    const Side& side = sides[s];
+    const EdgeSide& side = sides[s];
     const auto one = points(side);
     const Vector2d along = one[1] - one[0];
-    const auto corner = [&](const Side& at) {
+    const auto corner = [&](const EdgeSide& at) {
       return shape
           .triangles[static_cast<std::size_t>(at.triangle)][static_cast<std::size_t>(at.corner)];
     };
-    const auto third = [&](const Side& at) {
+    const auto third = [&](const EdgeSide& at) {
       return area(shape.corners[static_cast<std::size_t>(at.triangle)]) / 3;
     };
     Edge edge{side.low,

@@ -12,8 +12,7 @@ namespace {
 
 using Triangle = std::array<int, 3>;
 
-constexpr double kJitter = 0.3;             // of a spacing
-const double kRowHeight = std::sqrt(0.75);  // of equilateral triangles, spacings
+constexpr double kJitter = 0.3;  // of a spacing
 
 class Jitter {
  public:
@@ -40,32 +39,34 @@ double least_sine(const std::vector<Vector2d>& points, const Triangle& t) {
   return twice / std::max({ab, bc, ca});
 }
 
-// Rows of a rectangle of equilateral triangles; every other one begins and ends with half an edge.
+// Columns of a rectangle of equilateral triangles; every other one begins and ends with half an
+// edge.
 RestShape equilateral_rectangle(double length, double width, int columns, int rows) {
   std::vector<Vector2d> points;
-  std::vector<int> first;  // of each row
-  const double spacing = length / columns, height = width / rows;
-  for (int r = 0; r <= rows; ++r) {
+  std::vector<int> first;  // of each column
+  const double spacing = width / rows, height = length / columns;
+  for (int c = 0; c <= columns; ++c) {
     first.push_back(static_cast<int>(points.size()));
-    if (r % 2 == 0) {
-      for (int c = 0; c <= columns; ++c) points.emplace_back(c * spacing, r * height);
+    if (c % 2 == 0) {
+      for (int r = 0; r <= rows; ++r) points.emplace_back(c * height, r * spacing);
     } else {
-      points.emplace_back(0, r * height);
-      for (int c = 0; c < columns; ++c) points.emplace_back((c + 0.5) * spacing, r * height);
-      points.emplace_back(length, r * height);
+      points.emplace_back(c * height, 0);
+      for (int r = 0; r < rows; ++r) points.emplace_back(c * height, (r + 0.5) * spacing);
+      points.emplace_back(c * height, width);
     }
   }
   std::vector<Triangle> triangles;
-  for (int r = 0; r < rows; ++r) {
-    const bool even_below = r % 2 == 0;
-    const auto row = static_cast<std::size_t>(r);
-    const int even = first[even_below ? row : row + 1], odd = first[even_below ? row + 1 : row];
-    const auto add = [&](int a, int b, int c) {
-      triangles.push_back(even_below ? Triangle{a, b, c} : Triangle{a, c, b});
+  for (int c = 0; c < columns; ++c) {
+    const bool even_before = c % 2 == 0;
+    const auto column = static_cast<std::size_t>(c);
+    const int even = first[even_before ? column : column + 1];
+    const int odd = first[even_before ? column + 1 : column];
+    const auto add = [&](int a, int b, int d) {
+      triangles.push_back(even_before ? Triangle{a, b, d} : Triangle{a, d, b});
     };
-    for (int c = 0; c <= columns; ++c) {
-      add(even + c, odd + c + 1, odd + c);
-      if (c < columns) add(even + c, even + c + 1, odd + c + 1);
+    for (int r = 0; r <= rows; ++r) {
+      add(even + r, odd + r, odd + r + 1);
+      if (r < rows) add(even + r, odd + r + 1, even + r + 1);
     }
   }
   return rest_shape(points, triangles);
@@ -114,14 +115,15 @@ std::vector<Triangle> lower_hull(std::vector<Vector2d> points, std::vector<doubl
 
 }  // namespace
 
+double column_step(Cut cut) { return cut == Cut::kEquilateral ? std::sqrt(0.75) : 1; }
+
 RestShape cut_rectangle(Cut cut, double length, double width, double spacing) {
   const auto steps = [&](double size, double step) {
     return std::max(1, static_cast<int>(std::lround(size / step)));
   };
-  const int columns = steps(length, spacing);
-  if (cut == Cut::kEquilateral)
-    return equilateral_rectangle(length, width, columns, steps(width, kRowHeight * spacing));
+  const int columns = steps(length, column_step(cut) * spacing);
   const int rows = steps(width, spacing);
+  if (cut == Cut::kEquilateral) return equilateral_rectangle(length, width, columns, rows);
   Jitter jitter(kJitter * spacing);
   std::vector<Vector2d> points;
   for (int r = 0; r <= rows; ++r)
@@ -149,8 +151,8 @@ RestShape cut_rectangle(Cut cut, double length, double width, double spacing) {
 }
 
 RestShape cut_disc(Cut cut, double radius, double spacing) {
-  const double height = cut == Cut::kEquilateral ? kRowHeight * spacing : spacing;
-  const int half = static_cast<int>(std::ceil(radius / height));
+  const double step = column_step(cut) * spacing;
+  const int half = static_cast<int>(std::ceil(radius / step));
   Jitter jitter(kJitter * spacing);
   std::vector<Vector2d> points;
   std::vector<double> lift;
@@ -160,8 +162,8 @@ RestShape cut_disc(Cut cut, double radius, double spacing) {
   };
   for (int r = -half; r <= half; ++r)
     for (int c = -half; c <= half; ++c) {
-      Vector2d point(c * spacing, r * height);
-      if (cut == Cut::kEquilateral && r % 2 != 0) point.x() += spacing / 2;
+      Vector2d point(c * step, r * spacing);
+      if (cut == Cut::kEquilateral && c % 2 != 0) point.y() += spacing / 2;
       if (cut == Cut::kIrregular) point += Vector2d(jitter(), jitter());
       // which diagonal of a square is an edge; points on one circle leave it open
       constexpr double kSlight = 1e-3;

@@ -11,13 +11,16 @@ namespace weft {
 enum class Cut {
   kRight,        // squares with all diagonals alike
   kAlternating,  // squares with diagonals that take turns
-  kEquilateral,
+  kEquilateral,  // edges along v, none along u: it folds about v
   kIrregular  // a grid whose points are moved by up to 0.3 of its spacing, along the border alone
 };
 
 // A rectangle along u and v, of whole triangles whose edges are `spacing` long, or so; a corner
 // lies at the origin. m
 RestShape cut_rectangle(Cut cut, double length, double width, double spacing);
+
+// Between columns of particles of a rectangle, spacings.
+double column_step(Cut cut);
 
 // A disc about the origin, whose border is a polygon of edges that long.
 RestShape cut_disc(Cut cut, double radius, double spacing);

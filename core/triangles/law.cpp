@@ -186,33 +186,56 @@ void set_stiffness(const MembraneElement& element, const MembraneStiffness& stif
   for (int k = 0; k < 3; ++k) put(12 + k, bend[k]);
 }
 
+// Halves a sheet across its length, again and again: what lies near is then near in memory.
+class Halving {
+ public:
+  explicit Halving(const std::vector<std::vector<int>>& near)
+      : near_(near), part_(near.size()), order_(near.size()) {
+    std::iota(order_.begin(), order_.end(), 0);
+    halve(0, order_.size());
+  }
+  const std::vector<int>& order() const { return order_; }
+
+ private:
+  void halve(std::size_t begin, std::size_t end) {
+    constexpr std::size_t kBlock = TriangleLaw<float>::kBlock;
+    if (end - begin <= kBlock) return;
+    // from one end, which is farthest from any particle, to the other
+    spread(begin, end);
+    std::swap(order_[begin], order_[end - 1]);
+    spread(begin, end);
+    const std::size_t middle = begin + ((end - begin) / 2 + kBlock - 1) / kBlock * kBlock;
+    halve(begin, middle);
+    halve(middle, end);
+  }
+  // Orders a part by how many edges lead there from its first particle.
+  void spread(std::size_t begin, std::size_t end) {
+    const int mine = ++parts_, seen = ++parts_;
+    for (std::size_t k = begin; k < end; ++k) part_[index(order_[k])] = mine;
+    found_.clear();
+    for (std::size_t k = begin; k < end; ++k) {
+      visit(order_[k], mine, seen);
+      for (std::size_t at = found_.size() - 1; at < found_.size(); ++at)
+        for (const int j : near_[index(found_[at])]) visit(j, mine, seen);
+      if (found_.size() == end - begin) break;
+    }
+    std::copy(found_.begin(), found_.end(), order_.begin() + static_cast<std::ptrdiff_t>(begin));
+  }
+  void visit(int i, int mine, int seen) {
+    if (part_[index(i)] != mine) return;
+    part_[index(i)] = seen;
+    found_.push_back(i);
+  }
+
+  const std::vector<std::vector<int>>& near_;
+  std::vector<int> part_, order_, found_;
+  int parts_ = 0;
+};
+
 }  // namespace
 
 std::vector<int> near_order(const std::vector<std::vector<int>>& near) {
-  constexpr std::size_t kCluster = TriangleLaw<float>::kBlock;
-  std::vector<int> order, seeds;
-  std::vector<bool> taken(near.size());
-  const auto take = [&](int i) {
-    taken[index(i)] = true;
-    order.push_back(i);
-  };
-  std::size_t next_seed = 0;
-  for (std::size_t start = 0; start < near.size(); ++start) {
-    seeds.push_back(static_cast<int>(start));
-    // clusters grow, each around a particle beside those before it
-    for (; next_seed < seeds.size(); ++next_seed) {
-      if (taken[index(seeds[next_seed])]) continue;
-      const std::size_t begin = order.size(), end = begin + kCluster;
-      take(seeds[next_seed]);
-      for (std::size_t at = begin; at < order.size() && order.size() < end; ++at)
-        for (const int j : near[index(order[at])])
-          if (!taken[index(j)] && order.size() < end) take(j);
-      for (std::size_t at = begin; at < order.size(); ++at)
-        for (const int j : near[index(order[at])])
-          if (!taken[index(j)]) seeds.push_back(j);
-    }
-  }
-  return order;
+  return Halving(near).order();
 }
 
 template <class T>
@@ -315,7 +338,7 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
   std::size_t side = 0, reach = 0, blown = 0;
   for (std::size_t k = 0; k < order.size(); ++k) {
     const int i = order[k];
-    if (k % index(kBlock) == 0) law.blocks[k / index(kBlock)] = {side, reach, blown};
+    if (k % index(kBlock) == 0) law.blocks[k / index(kBlock)] = {side, reach, blown, 0};
     Gather<T>& gather = law.gathers.data()[k];
     for (const int j : near[index(i)]) {
       Side& made = law.sides.data()[side++] = {offset(j), {none, none}};
@@ -345,6 +368,10 @@ TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
       law.blown.data()[blown++] = static_cast<Offset>(4 * slot[index(spoke.triangle)]);
       ++gather.corners;
     }
+  }
+  for (std::size_t b = 0, at = 0; b < law.blocks.size(); ++b) {
+    while (at < triangles.size() && first(triangles[at]) < 4 * (b + 1) * index(kBlock)) ++at;
+    law.blocks[b].groups = static_cast<int>((at + index(kLanes) - 1) / index(kLanes));
   }
   return law;
 }

@@ -59,9 +59,10 @@ struct TriangleLaw {
   AlignedArray<Side> sides;
   AlignedArray<Reach<T>> reaches;
   AlignedArray<Offset> blown;  // of triangles
-  // Of each block of particles, where its share of them begins.
+  // Of each block of particles, where its share of these begins.
   struct Block {
     std::size_t side = 0, reach = 0, blown = 0;
+    int groups = 0;  // that have all triangles at it and at those before it
   };
   std::vector<Block> blocks;
   // Lets go of all these, until restore().

@@ -247,7 +247,8 @@ HWY_INLINE void move_block(D d, const TriangleLaw<T>& law, TriangleState<T>& sta
 }
 
 template <bool kBends, bool kDamps, bool kBlows, class T>
-T move_blocks(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last) {
+void move_blocks(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last,
+                 Farthest<T>& farthest) {
   using D = hn::ScalableTag<T>;
   const D d;
   constexpr std::size_t kMost = TriangleLaw<T>::kLanes;
@@ -261,9 +262,7 @@ T move_blocks(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int
     move_block(d, law, state, block, force, hn::Load(d, drift), hn::Load(d, air), largest);
   }
   hn::Store(largest, d, reached);
-  std::array<T, 4> axis{};
-  for (std::size_t k = 0; k < kMost; ++k) axis[k % 4] = std::max(axis[k % 4], reached[k]);
-  return std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
+  for (std::size_t k = 0; k < kMost; ++k) farthest[k % 4] = std::max(farthest[k % 4], reached[k]);
 }
 
 template <class T>
@@ -280,20 +279,19 @@ void strain_groups_of(const TriangleLaw<T>& law, TriangleState<T>& state, int fi
 }
 
 template <class T>
-T move_blocks_of(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last) {
+void move_blocks_of(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last,
+                    Farthest<T>& farthest) {
   const auto with = [&](auto bends, auto damps, auto blows) {
-    return move_blocks<decltype(bends)::value, decltype(damps)::value, decltype(blows)::value>(
-        law, state, first, last);
+    move_blocks<decltype(bends)::value, decltype(damps)::value, decltype(blows)::value>(
+        law, state, first, last, farthest);
   };
   const std::true_type on;
   const std::false_type off;
   const auto damped = [&](auto bends, auto damps) {
-    return law.wind.blows ? with(bends, damps, on) : with(bends, damps, off);
+    law.wind.blows ? with(bends, damps, on) : with(bends, damps, off);
   };
-  const auto bent = [&](auto bends) {
-    return law.damping > 0 ? damped(bends, on) : damped(bends, off);
-  };
-  return law.bends ? bent(on) : bent(off);
+  const auto bent = [&](auto bends) { law.damping > 0 ? damped(bends, on) : damped(bends, off); };
+  law.bends ? bent(on) : bent(off);
 }
 
 void strain_single(const TriangleLaw<float>& law, TriangleState<float>& state, int first,
@@ -304,12 +302,13 @@ void strain_double(const TriangleLaw<double>& law, TriangleState<double>& state,
                    int last) {
   strain_groups_of(law, state, first, last);
 }
-float move_single(const TriangleLaw<float>& law, TriangleState<float>& state, int first, int last) {
-  return move_blocks_of(law, state, first, last);
+void move_single(const TriangleLaw<float>& law, TriangleState<float>& state, int first, int last,
+                 Farthest<float>& farthest) {
+  move_blocks_of(law, state, first, last, farthest);
 }
-double move_double(const TriangleLaw<double>& law, TriangleState<double>& state, int first,
-                   int last) {
-  return move_blocks_of(law, state, first, last);
+void move_double(const TriangleLaw<double>& law, TriangleState<double>& state, int first, int last,
+                 Farthest<double>& farthest) {
+  move_blocks_of(law, state, first, last, farthest);
 }
 
 }  // namespace weft::HWY_NAMESPACE
@@ -333,11 +332,12 @@ void strain(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int l
     HWY_DYNAMIC_DISPATCH(strain_double)(law, state, first, last);
 }
 template <class T>
-T move(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last) {
+void move(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last,
+          Farthest<T>& farthest) {
   if constexpr (sizeof(T) == 4)
-    return HWY_DYNAMIC_DISPATCH(move_single)(law, state, first, last);
+    HWY_DYNAMIC_DISPATCH(move_single)(law, state, first, last, farthest);
   else
-    return HWY_DYNAMIC_DISPATCH(move_double)(law, state, first, last);
+    HWY_DYNAMIC_DISPATCH(move_double)(law, state, first, last, farthest);
 }
 
 // Calls part(band, first, last) for so many shares of `count`.
@@ -346,7 +346,6 @@ void share(int count, int bands, ThreadPool& pool, const F& part) {
   const auto at = [&](int band) {
     return static_cast<int>(static_cast<std::int64_t>(count) * band / bands);
   };
-  if (bands == 1) return part(0, 0, count);
   pool.run(bands, [&](int band) { part(band, at(band), at(band + 1)); });
 }
 
@@ -378,15 +377,35 @@ void TriangleState<T>::prepare(const TriangleLaw<T>& law) {
 
 template <class T>
 T sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool) {
-  share(law.groups, bands, pool,
-        [&](int, int first, int last) { strain(law, state, first, last); });
-  std::vector<T> farthest(static_cast<std::size_t>(bands));
-  share(static_cast<int>(law.blocks.size()), bands, pool, [&](int band, int first, int last) {
-    farthest[static_cast<std::size_t>(band)] = move(law, state, first, last);
-  });
+  const int blocks = static_cast<int>(law.blocks.size());
+  std::vector<Farthest<T>> farthest(static_cast<std::size_t>(bands));
+  if (bands == 1) {
+    // no triangle comes before its first particle: what is strained is still in cache when it pulls
+    constexpr int kRun = 16;
+    for (int first = 0, strained = 0; first < blocks; first += kRun) {
+      const int last = std::min(first + kRun, blocks);
+      const int groups = law.blocks[static_cast<std::size_t>(last - 1)].groups;
+      strain(law, state, std::exchange(strained, groups), groups);
+      move(law, state, first, last, farthest.front());
+    }
+  } else {
+    share(law.groups, bands, pool,
+          [&](int, int first, int last) { strain(law, state, first, last); });
+    share(blocks, bands, pool, [&](int band, int first, int last) {
+      move(law, state, first, last, farthest[static_cast<std::size_t>(band)]);
+    });
+  }
   std::swap(state.x, state.next_x);
   std::swap(state.w, state.next_w);
-  return *std::max_element(farthest.begin(), farthest.end());
+
+  // by axis, so that it does not depend on the bands
+  T square = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    T most = 0;
+    for (const Farthest<T>& band : farthest) most = std::max(most, band[axis]);
+    square += most * most;
+  }
+  return std::sqrt(square);
 }
 
 template struct TriangleState<float>;

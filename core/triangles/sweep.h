@@ -26,6 +26,10 @@ struct TriangleState {
   std::size_t size() const { return x.size(); }
 };
 
+// Largest displacements along each axis, m.
+template <class T>
+using Farthest = std::array<T, 4>;
+
 // One substep of all triangles, then of all particles. Equal bits on every processor with FMA, and
 // for every number of bands. Returns a bound of the largest displacement where law.measured, m.
 template <class T>

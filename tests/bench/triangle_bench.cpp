@@ -31,7 +31,7 @@ struct Case {
 RestShape shape_of(Kind kind, int columns) {
   const double spacing = 1.0 / (columns - 1);
   if (kind == Kind::kDelaunay) return testing::scattered(columns, spacing);
-  return testing::square(kind == Kind::kRight ? testing::Cut::kRight : testing::Cut::kAlternating,
+  return testing::square(kind == Kind::kRight ? Cut::kRight : Cut::kAlternating,
                          1, spacing);
 }
 

@@ -152,5 +152,22 @@ TEST(TShirtMesh, HasTwoPanelsFourOpeningsAndItsSeams) {
   EXPECT_LT(facts.lowest[0].cost, 1.5);
 }
 
+TEST_F(MeshScene, OfATShirtIsCheckedAndRecorded) {
+  const Outcome made = make("shirt.obj", t_shirt_obj({.spacing = 0.031}), {"--pin", "border:top"});
+  ASSERT_EQ(made.exit, 0) << made.err;
+  const std::string scene = directory_.path("scene.json"), file = directory_.path("shirt.weft");
+  const Outcome checked = run_weft({"scene", "check", scene});
+  EXPECT_EQ(checked.exit, 0) << checked.err;
+  EXPECT_THAT(
+      checked.out,
+      HasSubstr("1 sheet, " + std::to_string(sheet().triangles().data().positions_m().size() / 12) +
+                " particles"));
+  const Outcome recorded =
+      run_weft({"record", scene, "--embedded", "--to", "5", "--json", "-o", file});
+  ASSERT_EQ(recorded.exit, 0) << recorded.err;
+  EXPECT_EQ(recorded.json()["frames"], 6);
+  EXPECT_LT(recorded.json()["largest_strain"], 0.2);
+}
+
 }  // namespace
 }  // namespace weft::testing

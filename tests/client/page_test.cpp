@@ -7,6 +7,7 @@
 #include "client/recording/points.h"
 #include "client/recording/reader.h"
 #include "tests/client/client_test.h"
+#include "tests/support/service/assets.h"
 
 namespace weft::testing {
 namespace {
@@ -137,6 +138,33 @@ TEST_F(PageTest, SaysWhatItShows) {
   EXPECT_EQ(page["recordings"][1]["colliders"][0]["sphere"]["radius_m"], 0.2);
   EXPECT_THAT(page.dump(), AllOf(HasSubstr("[\"k_s, stretch\",\"200 N/m\"]"),
                                  HasSubstr("[\"spacing\",\"50 mm\"]")));
+}
+
+TEST_F(PageTest, ASheetOfTrianglesBringsThemAndItsPanels) {
+  v1::MeshData mesh = square_mesh(4);
+  for (const char* name : {"front", "back"}) {
+    v1::Panel& panel = *mesh.add_panels();
+    panel.set_name(name);
+    panel.set_triangle_count(16);
+    panel.set_grain_rad(name == std::string("back") ? std::acos(-1) / 6 : 0);
+  }
+  service_.create(scene_of(mesh), "sewn");
+  const std::string sewn = path("sewn.weft");
+  ask({"record", "sewn", "--run", "--to", "2", "-o", sewn});
+  const double bound = ask({"view", sewn, hung_, "-o", page_})["largest_error_m"];
+  EXPECT_LE(bound, 0.25 / 8192);  // of an edge
+  const nlohmann::json page = description(read_file(page_));
+  const nlohmann::json& sheet = page["recordings"][0]["sheets"][0];
+  EXPECT_EQ(sheet["particle_count"], 25);
+  EXPECT_EQ(from_base64(sheet["mesh"]["triangles"]), mesh.triangles());
+  EXPECT_EQ(from_base64(sheet["mesh"]["flat_m"]), mesh.flat_m());
+  EXPECT_EQ(sheet["mesh"]["panels"][1]["name"], "back");
+  EXPECT_THAT(page["recordings"][0]["facts"].dump(),
+              AllOf(HasSubstr("[\"particles\",\"25\"],[\"triangles\",\"32\"]"),
+                    HasSubstr("[\"median edge\",\"250 mm\"],[\"area\",\"1 m²\"]"),
+                    HasSubstr("[\"panel front\",\"0.5 m²\"]"),
+                    HasSubstr("[\"panel back\",\"0.5 m², grain 30°\"]")));
+  EXPECT_FALSE(page["recordings"][1]["sheets"][0].contains("mesh"));
 }
 
 TEST_F(PageTest, ATitleCannotEndItsScript) {

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <numbers>
 
 #include "client/render/stage.h"
 #include "tests/client/client_test.h"
+#include "tests/support/service/assets.h"
 
 namespace weft::testing {
 namespace {
@@ -247,6 +249,81 @@ TEST_F(RenderTest, TheBendingEnergyOfAllParticlesIsWhatTheSolverHasOfIt) {
   }
   EXPECT_GT(energy, 1e-7);
   EXPECT_NEAR(energy, recording.read(0).stats().potential_energy_j(), 1e-4 * energy);
+}
+
+// A square of 1 m x 1 m in triangles, its particles where `place` has those of its flat shape.
+v1::Scene laid(const std::function<Eigen::Vector3d(double u, double v)>& place) {
+  constexpr int kCells = 20;
+  v1::Scene scene = scene_of(square_mesh(kCells));
+  scene.mutable_environment()->mutable_gravity_m_per_s2();  // none
+  v1::Sheet& sheet = *scene.mutable_sheets(0);
+  for (int i = 0; i < (kCells + 1) * (kCells + 1); ++i) {
+    const double u = i % (kCells + 1), v = i / (kCells + 1);
+    for (const double coordinate : place(u / kCells, v / kCells))
+      sheet.add_start_positions_m(coordinate);
+  }
+  return scene;
+}
+
+TEST_F(RenderTest, StrainOfTrianglesIsToldAlongWarpAndWeftAndAsShear) {
+  const std::string file = record(
+      laid([](double u, double v) { return Eigen::Vector3d(1.1 * v + 0.2 * u, 0, 0.9 * u); }),
+      "strained");
+  const auto largest = [&](const std::string& colour, const std::string& field) {
+    return ask({"render", file, "--frame", "0", "--colour", colour, "--size", "64x64", "-o",
+                png_})[field]
+        .get<double>();
+  };
+  const double weft = std::hypot(0.2, 0.9);
+  EXPECT_NEAR(largest("strain", "largest_strain"), 0.1, 1e-6);
+  EXPECT_NEAR(largest("warp", "largest_warp_strain"), 0.1, 1e-6);
+  EXPECT_NEAR(largest("weft", "largest_weft_strain"), 1 - weft, 1e-6);
+  EXPECT_NEAR(largest("shear", "largest_shear"), 0.2 / weft, 1e-6);
+}
+
+TEST_F(RenderTest, TrianglesOnACylinderHaveTheBendingEnergyOfItsCurvature) {
+  constexpr double kRadius = 0.4;
+  const auto arc = [](double length) {
+    return Eigen::Vector2d(kRadius * std::sin(length / kRadius),
+                           kRadius * std::cos(length / kRadius));
+  };
+  const std::vector<std::function<Eigen::Vector3d(double, double)>> ways{
+      [&](double u, double v) { return Eigen::Vector3d(arc(v).x(), arc(v).y(), u); },
+      [&](double u, double v) { return Eigen::Vector3d(v, arc(u).y(), arc(u).x()); },
+      [&](double u, double v) {
+        const double along = (u + v) / std::numbers::sqrt2, across = (u - v) / std::numbers::sqrt2;
+        return Eigen::Vector3d(arc(along).x(), arc(along).y(), across);
+      }};
+  for (std::size_t way = 0; way < ways.size(); ++way) {
+    const std::string file = record(laid(ways[way]), "rolled-" + std::to_string(way));
+    const auto answer =
+        ask({"render", file, "--frame", "0", "--colour", "bending", "--size", "64x64", "-o", png_});
+    const double expected = 1e-5 / 2 / (kRadius * kRadius);
+    EXPECT_NEAR(answer["largest_bending_energy_j_per_m2"], expected, 0.01 * expected) << way;
+  }
+}
+
+TEST_F(RenderTest, PanelsHaveColoursOfTheirOwn) {
+  v1::MeshData mesh = square_mesh(10);
+  for (const char* name : {"lower", "upper"}) {
+    v1::Panel& panel = *mesh.add_panels();
+    panel.set_name(name);
+    panel.set_triangle_count(100);
+  }
+  v1::Scene scene = scene_of(mesh);
+  v1::Rotation& upright = *scene.mutable_sheets(0)->mutable_placement()->mutable_rotation();
+  upright.set_w(1);
+  upright.set_z(-1);  // the warp hangs down
+  const std::string file = record(scene, "panels");
+  const auto fronts = [&](const std::string& colour) {
+    const Image image = render({file, "--frame", "0", "--colour", colour, "--size", "100x100",
+                                "--azimuth", "90", "--elevation", "0"});
+    return find_front(image, 0, 100);
+  };
+  const Seen cloth = fronts("cloth");
+  const Seen panels = fronts("panels");
+  EXPECT_NEAR(cloth.width(), cloth.height(), 2);
+  EXPECT_NEAR(panels.height(), cloth.height() / 2.0, 2);
 }
 
 TEST_F(RenderTest, ShowsSeveralFramesAndTheSameBytesAgain) {

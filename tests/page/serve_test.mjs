@@ -1,9 +1,10 @@
 // The page of `weft serve` in Chromium, by what a person does; ./dev test-page runs it.
 import assert from 'node:assert/strict';
 import {spawn} from 'node:child_process';
-import {mkdirSync, readFileSync} from 'node:fs';
+import {mkdirSync, readFileSync, writeFileSync} from 'node:fs';
 import {after, before, test} from 'node:test';
 import {canvas, directory, file, open as openUrl, picture, plain, program, settle, weft as run} from './browser.mjs';
+import {sewn} from './sewn.mjs';
 
 const programs = new Set();
 let address;
@@ -45,6 +46,8 @@ before(async () => {
     weft('scene', 'new', '--textile', 'wool_tropical', '--template', ...options, '-o', file(`${name}.json`));
     weft('session', 'create', file(`${name}.json`), '--id', name);
   }
+  writeFileSync(file('sewn.json'), JSON.stringify(sewn()));
+  weft('session', 'create', file('sewn.json'), '--id', 'sewn');
   mkdirSync(file('recordings'));
   await serve('0');
 });
@@ -148,6 +151,30 @@ test('the mouse takes the cloth by a particle, which follows it and is let go', 
   assert.ok(held > 0, 'it was led away and held');
   assert.ok(way(frames.at(-1), frames[held]) > 0.02, 'it was let go');
   await pause(page);
+  await close();
+});
+
+test('a cloth of triangles is shown by its panels and led by any particle', async () => {
+  const {page, close} = await open('sewn');
+  await page.locator('#speed').selectOption('1');
+  await play(page);
+  await pass(page, 20);
+  await page.locator('#colour').selectOption('panels');
+  await page.keyboard.press('l');
+  const {x, y, width, height} = await page.locator('#view').boundingBox();
+  await page.mouse.move(x + 0.6 * width, y + 0.45 * height);
+  await page.mouse.down();
+  await says(page, 'doing', /Leads particle \d+ from frame \d+ on/);
+  await page.mouse.move(x + 0.6 * width + 80, y + 0.45 * height - 60, {steps: 10});
+  await pass(page, 30);
+  assert.deepEqual(await page.locator('#panels li').allTextContents(), ['left', 'right']);
+  await picture(page, 'serve-sewn');
+  await page.mouse.up();
+  await says(page, 'doing', /Let go/);
+  await page.locator('#colour').selectOption('weft');
+  await says(page, 'least', /^−[\d.]+ %$/);
+  await pause(page);
+  await picture(page, 'serve-sewn-weft');
   await close();
 });
 

@@ -1,9 +1,10 @@
 // The page of `weft view` in Chromium, by what a person does; ./dev test-page runs it.
 import assert from 'node:assert/strict';
-import {statSync} from 'node:fs';
+import {statSync, writeFileSync} from 'node:fs';
 import {pathToFileURL} from 'node:url';
 import {before, test} from 'node:test';
 import {canvas, file, open as openUrl, picture, plain, settle, weft} from './browser.mjs';
+import {sewn} from './sewn.mjs';
 
 before(() => {
   for (const [name, stiffness] of [['limp', '0'], ['stiff', '0.3']]) {
@@ -12,6 +13,9 @@ before(() => {
   }
   weft('view', file('limp.weft'), file('stiff.weft'), '-o', file('pair.html'), '--title', 'Limp and stiff');
   weft('view', file('stiff.weft'), '-o', file('one.html'));
+  writeFileSync(file('sewn.json'), JSON.stringify(sewn()));
+  weft('record', file('sewn.json'), '--embedded', '--to', '60', '-o', file('sewn.weft'));
+  weft('view', file('sewn.weft'), '-o', file('sewn.html'));
 });
 
 // The page from disk, without a network, standing at its first frame.
@@ -140,5 +144,60 @@ test('ten seconds of 31 x 31 at 60 frames a second take less than 5 MB', async (
   await page.keyboard.press('End');
   await settle(page);
   await picture(page, 'flag');
+  await close();
+});
+
+const kSewn = {particles: 676, triangles: 1250};
+
+test('a cloth of triangles is shown with its panels, in light and dark', async () => {
+  const {page, close} = await open('sewn.html');
+  const facts = plain(await page.textContent('#facts'));
+  for (const fact of [`particles${kSewn.particles}`, `triangles${kSewn.triangles}`, 'panels2', 'panel left', 'grain 22.5°']) {
+    assert.ok(facts.includes(fact), `${fact} in ${facts}`);
+  }
+  await page.keyboard.press('End');
+  await settle(page);
+  await picture(page, 'sewn');
+  const cloth = await canvas(page);
+  await page.locator('#colour').selectOption('panels');
+  await page.keyboard.press('l');
+  await settle(page);
+  assert.deepEqual(await page.locator('#panels li').allTextContents(), ['left', 'right']);
+  assert.notEqual(await canvas(page), cloth);
+  await picture(page, 'sewn-panels');
+  await page.getByRole('button', {name: 'Theme'}).click();
+  await settle(page);
+  await picture(page, 'sewn-panels-dark');
+  await close();
+});
+
+test('colours of triangles mean what weft render says', async () => {
+  const {page, close} = await open('sewn.html');
+  await page.keyboard.press('End');
+  await page.getByLabel('Scale to this frame').waitFor({state: 'attached'});
+  for (const [colour, field] of [['strain', 'largest_strain'], ['warp', 'largest_warp_strain'],
+    ['weft', 'largest_weft_strain'], ['shear', 'largest_shear'], ['bending', 'largest_bending_energy_j_per_m2']]) {
+    await page.locator('#colour').selectOption(colour);
+    await settle(page);
+    await page.getByLabel('Scale to this frame').check();
+    await settle(page);
+    const shown = parseFloat(await page.textContent('#most')) / (colour === 'bending' ? 1 : 100);
+    const said = JSON.parse(weft('render', file('sewn.weft'), '--colour', colour, '--size', '64x64', '--json',
+      '-o', file('sewn.png')))[field];
+    assert.ok(Math.abs(shown / said - 1) < 0.02, `${colour}: ${shown}, ${said}`);
+    const balanced = ['warp', 'weft', 'shear'].includes(colour);
+    assert.equal((await page.textContent('#least')).startsWith(balanced ? '−' : '0'), true);
+    await picture(page, `sewn-${colour}`);
+  }
+  await close();
+});
+
+test('on a phone the panels of a cloth fit the width', async () => {
+  const {page, close} = await open('sewn.html', {viewport: {width: 390, height: 844}, hasTouch: true, deviceScaleFactor: 2, colorScheme: 'dark'});
+  await page.keyboard.press('End');
+  await page.locator('#colour').selectOption('warp');
+  await settle(page);
+  assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
+  await picture(page, 'sewn-phone');
   await close();
 });

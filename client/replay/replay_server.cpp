@@ -42,7 +42,8 @@ SheetShape shape_of(const SheetMesh& sheet, const v1::Sheet& recorded) {
     return Grid{
         .rows = layout.rows(), .columns = layout.columns(), .spacing = recorded.grid().spacing_m()};
   }
-  TriangleMesh mesh{.triangles = sheet.triangles};
+  TriangleMesh mesh;
+  mesh.triangles = sheet.triangles;
   mesh.start.resize(particle_count(layout), Vector3d::Zero());
   for (const auto& [u, v] : sheet.flat) mesh.flat.emplace_back(u, v);
   mesh.flat_triangles = sheet.flat_triangles;

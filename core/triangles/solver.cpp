@@ -36,6 +36,7 @@ class TriangleSolver : public SheetSolver {
       origin_ /= particles_;
     }
     set_step();
+    complete();
     // half a kick: x(-dt) = x - v dt + a dt^2 / 2
     Matrix3Xd a;
     accelerate(dynamics_, time, x, v, a);

@@ -124,7 +124,7 @@ void strain_groups(const TriangleLaw<T>& law, TriangleState<T>& state, int first
 template <class T>
 struct Quad {
   using D = hn::CappedTag<T, 4>;
-  static constexpr int kLanes = static_cast<int>(hn::MaxLanes(D())), kParts = 4 / kLanes;
+  static constexpr std::size_t kLanes = hn::MaxLanes(D()), kParts = 4 / kLanes;
   using V = hn::Vec<D>;
   std::array<V, kParts> part;
 
@@ -135,25 +135,27 @@ struct Quad {
   }
   static HWY_INLINE Quad load(const T* from) {
     Quad q;
-    for (int k = 0; k < kParts; ++k) q.part[k] = hn::Load(D(), from + k * kLanes);
+    for (std::size_t k = 0; k < kParts; ++k) q.part[k] = hn::Load(D(), from + k * kLanes);
     return q;
   }
   HWY_INLINE void store(T* to) const {
-    for (int k = 0; k < kParts; ++k) hn::Store(part[k], D(), to + k * kLanes);
+    for (std::size_t k = 0; k < kParts; ++k) hn::Store(part[k], D(), to + k * kLanes);
   }
   HWY_INLINE void add(const Quad& q) {
-    for (int k = 0; k < kParts; ++k) part[k] = hn::Add(part[k], q.part[k]);
+    for (std::size_t k = 0; k < kParts; ++k) part[k] = hn::Add(part[k], q.part[k]);
   }
   HWY_INLINE void add(T s, const Quad& q) {
-    for (int k = 0; k < kParts; ++k) part[k] = hn::MulAdd(hn::Set(D(), s), q.part[k], part[k]);
+    for (std::size_t k = 0; k < kParts; ++k)
+      part[k] = hn::MulAdd(hn::Set(D(), s), q.part[k], part[k]);
   }
   HWY_INLINE void subtract(T s, const Quad& q) {
-    for (int k = 0; k < kParts; ++k) part[k] = hn::NegMulAdd(hn::Set(D(), s), q.part[k], part[k]);
+    for (std::size_t k = 0; k < kParts; ++k)
+      part[k] = hn::NegMulAdd(hn::Set(D(), s), q.part[k], part[k]);
   }
   // From `other` to what lies at p.
   static HWY_INLINE Quad apart(const T* p, const Quad& other) {
     Quad q = load(p);
-    for (int k = 0; k < kParts; ++k) q.part[k] = hn::Sub(q.part[k], other.part[k]);
+    for (std::size_t k = 0; k < kParts; ++k) q.part[k] = hn::Sub(q.part[k], other.part[k]);
     return q;
   }
 };

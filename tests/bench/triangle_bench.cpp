@@ -31,8 +31,7 @@ struct Case {
 RestShape shape_of(Kind kind, int columns) {
   const double spacing = 1.0 / (columns - 1);
   if (kind == Kind::kDelaunay) return testing::scattered(columns, spacing);
-  return testing::square(kind == Kind::kRight ? Cut::kRight : Cut::kAlternating,
-                         1, spacing);
+  return testing::square(kind == Kind::kRight ? Cut::kRight : Cut::kAlternating, 1, spacing);
 }
 
 // A square metre of cotton hung by two corners.
@@ -40,7 +39,7 @@ Scene scene_of(const Case& given) {
   const int n = given.columns;
   SheetDefinition sheet;
   sheet.name = "cloth";
-  sheet.shape = complete(testing::triangle_mesh(shape_of(given.kind, n)));
+  sheet.shape = complete(triangle_mesh(shape_of(given.kind, n)));
   const double rigidity = given.bends ? 1e-5 : 0;
   sheet.textile.model = MeasuredTextile{.areal_density = 0.15,
                                         .tensile_warp = 1000,

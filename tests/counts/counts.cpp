@@ -6,6 +6,7 @@
 
 #include "core/simulation.h"
 #include "tests/support/core/scenes.h"
+#include "tests/support/core/triangle_meshes.h"
 
 namespace weft::counts {
 namespace {
@@ -77,6 +78,65 @@ Simulation asleep() {
   return simulation(scene, 40);
 }
 
+// A curtain of triangles that swings, of cotton.
+Scene draped() {
+  SheetDefinition sheet;
+  sheet.shape = complete(triangle_mesh(testing::scattered(31, 0.01)));
+  sheet.textile = {MeasuredTextile{.areal_density = 0.15,
+                                   .tensile_warp = 100,
+                                   .tensile_weft = 100,
+                                   .shear = 10,
+                                   .bend_rigidity_warp = 1e-6,
+                                   .bend_rigidity_weft = 1e-6},
+                   1e-4, 0.3};
+  sheet.bending = Isometric{};
+  sheet.pins = {{{0, 30}, {}}};
+  Scene scene = testing::floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.solver.frame_step = 16 * 2e-5;
+  scene.solver.substep = 2e-5;
+  scene.solver.max_repairs = 0;  // energies that the guard asks for depend on the motion
+  return scene;
+}
+void take_bending(Scene& scene) {
+  auto& textile = std::get<MeasuredTextile>(scene.sheets[0].textile.model);
+  textile.bend_rigidity_warp = textile.bend_rigidity_weft = 0;
+}
+
+Simulation triangles() { return simulation(draped()); }
+
+Simulation triangles_with_far_collider() {
+  Scene scene = draped();
+  scene.colliders = {{"ball", Sphere{{50, 0, 0}, 0.1}, 0.3, {}}};
+  return simulation(scene);
+}
+
+Simulation triangles_with_wind() {
+  Scene scene = draped();
+  scene.environment.wind = Wind{};
+  return simulation(scene);
+}
+
+Simulation triangles_without_damping() {
+  Scene scene = draped();
+  scene.sheets[0].textile.damping = 0;
+  return simulation(scene);
+}
+
+Simulation triangles_without_bending() {
+  Scene scene = draped();
+  take_bending(scene);
+  return simulation(scene);
+}
+
+Simulation triangles_with_bending_taken_away() {
+  Simulation made = triangles();
+  Scene scene = made.scene();
+  take_bending(scene);
+  if (made.set_textile(0, scene.sheets[0].textile)) std::abort();
+  return made;
+}
+
 }  // namespace
 
 // By name, for the counter.
@@ -97,7 +157,13 @@ int main(int count, char** arguments) {
       {"no_bending", without_bending},
       {"bending_taken_away", bending_taken_away},
       {"no_guard", without_guard},
-      {"asleep", asleep}};
+      {"asleep", asleep},
+      {"triangles", triangles},
+      {"triangles_far_collider", triangles_with_far_collider},
+      {"triangles_wind", triangles_with_wind},
+      {"triangles_no_damping", triangles_without_damping},
+      {"triangles_no_bending", triangles_without_bending},
+      {"triangles_bending_taken_away", triangles_with_bending_taken_away}};
   const auto found = count == 2 ? cases.find(arguments[1]) : cases.end();
   if (found == cases.end()) {
     std::fputs("weft-counts CASE: none of that name\n", stderr);

@@ -42,6 +42,17 @@ class Counts(unittest.TestCase):
         unguarded = instructions("no_guard")
         self.assertLess(instructions("plain") - unguarded, 0.01 * 2 * unguarded)
 
+    def test_sheets_of_triangles_pay_for_what_they_have_alone(self):
+        plain = instructions("triangles")
+        self.assertLess(instructions("triangles_no_damping"), NOTHING * plain)
+        self.assertLess(instructions("triangles_no_bending"), 0.8 * plain)
+        self.assertLess(instructions("triangles_far_collider"), 1.02 * plain)
+        self.assertGreater(instructions("triangles_wind"), 1.1 * plain)
+
+    def test_bending_taken_from_triangles_costs_what_triangles_without_it_cost(self):
+        self.assertLess(instructions("triangles_bending_taken_away"),
+                        NOTHING * instructions("triangles_no_bending"))
+
     def test_a_scene_asleep_costs_nothing(self):
         self.assertLess(instructions("asleep"), 1e-4 * instructions("plain"))
 

@@ -203,6 +203,7 @@ class Balance {
       scatter(i, -fits_[i].area * fits_[i].weights, residual);
     const double enough = kEnough * kEnough * product(area_weights(), area_weights());
     const VectorXd diagonal = diagonals();
+    if (diagonal.maxCoeff() <= 0) return;  // no fit has more neighbours than it needs
     Matrix3Xd multiplier = Matrix3Xd::Zero(3, residual.cols()), along = multiplier;
     double before = 0;
     for (int k = 0; k < kMost && product(residual, residual) > enough; ++k) {
@@ -213,7 +214,9 @@ class Balance {
       Matrix3Xd sums = Matrix3Xd::Zero(3, residual.cols());
       for (std::size_t i = 0; i < fits_.size(); ++i)
         scatter(i, fits_[i].area * added(i, along), sums);
-      const double step = now / product(along, sums);
+      const double stiffness = product(along, sums);
+      if (stiffness <= 0) break;
+      const double step = now / stiffness;
       multiplier += step * along;
       residual -= step * sums;
     }

@@ -18,7 +18,7 @@
 namespace weft::testing {
 namespace {
 
-MeasuredTextile cotton() {
+MeasuredTextile poplin() {
   return {.areal_density = 0.15,
           .tensile_warp = 1000,
           .tensile_weft = 700,
@@ -27,18 +27,18 @@ MeasuredTextile cotton() {
           .bend_rigidity_weft = 5e-6};
 }
 
-SheetDefinition sheet_of(TriangleMesh mesh) {
+SheetDefinition cloth_of(TriangleMesh mesh) {
   SheetDefinition sheet;
   sheet.name = "cloth";
   sheet.shape = complete(std::move(mesh));
-  sheet.textile.model = cotton();
+  sheet.textile.model = poplin();
   sheet.bending = Isometric{};
   return sheet;
 }
 
-Scene scene_of(TriangleMesh mesh) {
+Scene hung_scene(TriangleMesh mesh) {
   Scene scene;
-  scene.sheets.push_back(sheet_of(std::move(mesh)));
+  scene.sheets.push_back(cloth_of(std::move(mesh)));
   return scene;
 }
 
@@ -84,7 +84,7 @@ double measured_step(const Scene& scene, const Matrix3Xd& x) {
 
 TEST_P(OnMeshes, TheLinearBoundLiesBelowTheMeasuredStepAndTheEstimateMeetsIt) {
   for (const double strain : {0.0, 0.02}) {
-    Scene scene = scene_of(triangle_mesh(square(GetParam(), 0.12, 0.02)));
+    Scene scene = hung_scene(triangle_mesh(square(GetParam(), 0.12, 0.02)));
     SheetDefinition& sheet = scene.sheets[0];
     const Mesh mesh = make_mesh(sheet);
     const Matrix3Xd x = (1 + strain) * start_positions(sheet);
@@ -103,7 +103,7 @@ TEST(Meshes, ASliverLimitsTheStepAndIsNamed) {
   mesh.flat[7].x() += 0.018;  // next to its neighbour
   for (std::size_t i = 0; i < mesh.start.size(); ++i)
     mesh.start[i] = {mesh.flat[i].y(), 0, mesh.flat[i].x()};
-  const Simulation simulation(scene_of(std::move(mesh)));
+  const Simulation simulation(hung_scene(std::move(mesh)));
   const auto& warnings = simulation.plan().warnings;
   const auto sliver = std::find_if(warnings.begin(), warnings.end(),
                                    [](const Warning& each) { return each.code == "SLIVER"; });
@@ -112,7 +112,7 @@ TEST(Meshes, ASliverLimitsTheStepAndIsNamed) {
 }
 
 TEST_P(OnMeshes, AHungSheetComesToRestAndKeepsItsEnergyBudget) {
-  Scene scene = scene_of(triangle_mesh(square(GetParam(), 0.2, 0.02)));
+  Scene scene = hung_scene(triangle_mesh(square(GetParam(), 0.2, 0.02)));
   scene.sheets[0].textile.damping = 0.01;
   scene.sheets[0].pins = {{{0}, {}}, {{10}, {}}};
   Simulation simulation(scene);
@@ -129,7 +129,7 @@ TEST_P(OnMeshes, AHungSheetComesToRestAndKeepsItsEnergyBudget) {
 
 TEST(Meshes, ALatticeGivenAsTrianglesHangsLikeTheLattice) {
   Scene lattice;
-  lattice.sheets.push_back(sheet_of(triangle_mesh(square(Cut::kAlternating, 0.2, 0.01))));
+  lattice.sheets.push_back(cloth_of(triangle_mesh(square(Cut::kAlternating, 0.2, 0.01))));
   lattice.sheets[0].textile.damping = 0.02;
   Scene grid = lattice;
   grid.sheets[0].shape = Grid{21, 21, 0.01};
@@ -180,7 +180,7 @@ TEST(Meshes, PanelsOfOneTextileSewnWithTurnedGrainBendAsOnePiece) {
       x.col(i) = Vector3d(x(0, i), -0.5 * std::pow(0.6 * x(0, i) + 0.8 * x(2, i), 2), x(2, i));
     return curvature_energy(mesh.surface, x);
   };
-  SheetDefinition one = sheet_of(sewn), two = sheet_of(halves);
+  SheetDefinition one = cloth_of(sewn), two = cloth_of(halves);
   EXPECT_TRUE(find_problems(*std::get<Triangles>(two.shape), "").empty());
   EXPECT_NEAR(energy_of(two) / energy_of(one), 1, 1e-9);
 }
@@ -226,7 +226,7 @@ TEST(Meshes, FaultsOfTrianglesAreNamedWithTheirPlace) {
 }
 
 TEST(Meshes, RawTextilesNeedConnections) {
-  Scene scene = scene_of(triangle_mesh(square(Cut::kRight, 0.1, 0.05)));
+  Scene scene = hung_scene(triangle_mesh(square(Cut::kRight, 0.1, 0.05)));
   scene.sheets[0].textile.model = RawTextile{.particle_mass = 0.001, .stretch = 100};
   const auto problems = find_problems(scene);
   ASSERT_EQ(problems.size(), 1U);
@@ -236,12 +236,12 @@ TEST(Meshes, RawTextilesNeedConnections) {
 }
 
 TEST(Meshes, ConnectionsBendAndStretchAnEvenTextileRightOnEquilateralTrianglesAlone) {
-  MeasuredTextile even = cotton();
+  MeasuredTextile even = poplin();
   even.tensile_weft = even.tensile_warp;
   even.shear = even.tensile_warp / 2;  // no direction of its own
   even.bend_rigidity_weft = even.bend_rigidity_warp;
   const auto error_on = [&](Cut cut) {
-    SheetDefinition sheet = sheet_of(triangle_mesh(square(cut, 1, 0.04)));
+    SheetDefinition sheet = cloth_of(triangle_mesh(square(cut, 1, 0.04)));
     sheet.textile.model = even;
     sheet.bending = ChoiKo{};
     Mesh mesh;
@@ -257,7 +257,7 @@ TEST(Meshes, ConnectionsBendAndStretchAnEvenTextileRightOnEquilateralTrianglesAl
 }
 
 TEST(Meshes, ThePapersLawHangsASheetAndSaysThatItDependsOnTheMesh) {
-  Scene scene = scene_of(triangle_mesh(square(Cut::kIrregular, 0.2, 0.04)));
+  Scene scene = hung_scene(triangle_mesh(square(Cut::kIrregular, 0.2, 0.04)));
   SheetDefinition& sheet = scene.sheets[0];
   sheet.pins = {{{0, 5}, {}}};
   for (const Evaluator evaluator :

@@ -15,17 +15,6 @@ namespace {
 
 constexpr std::size_t kMessage = 256 << 10;  // bytes of the asset in one
 
-std::string asset_name(const std::string& bytes) {
-  std::array<unsigned char, SHA256_DIGEST_LENGTH> hash{};
-  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), hash.data());
-  std::string name = "assets/";
-  for (const unsigned char byte : hash) {
-    name += "0123456789abcdef"[byte >> 4];
-    name += "0123456789abcdef"[byte & 15];
-  }
-  return name;
-}
-
 // One stream: asks what there is where there are no bytes, else sends those that are missing.
 grpc::Status send(Connection& connection, const Attempts& attempts,
                   const v1::UploadAssetRequest& first, const std::string* bytes, v1::Asset& asset) {
@@ -45,7 +34,45 @@ grpc::Status send(Connection& connection, const Attempts& attempts,
   return writer->Finish();
 }
 
+// From there on.
+grpc::Status receive(Connection& connection, const Attempts& attempts,
+                     const v1::DownloadAssetRequest& request, std::string& bytes) {
+  grpc::ClientContext context;
+  attempts.address(context);
+  const std::stop_callback cancel(connection.stop(), [&] { context.TryCancel(); });
+  const auto reader = connection.assets().DownloadAsset(&context, request);
+  v1::DownloadAssetResponse message;
+  while (reader->Read(&message)) bytes += message.data();
+  return reader->Finish();
+}
+
+std::string download_asset(Connection& connection, const std::string& name) {
+  v1::DownloadAssetRequest request;
+  request.set_name(name);
+  Attempts attempts(connection, request);
+  std::string bytes;
+  for (;;) {
+    const grpc::Status status = receive(connection, attempts, request, bytes);
+    if (status.ok()) return bytes;
+    const auto received = static_cast<std::int64_t>(bytes.size());
+    if (received > request.offset()) attempts.note_message();
+    request.set_offset(received);
+    attempts.go_on_after(status);
+  }
+}
+
 }  // namespace
+
+std::string asset_name(const std::string& bytes) {
+  std::array<unsigned char, SHA256_DIGEST_LENGTH> hash{};
+  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(), hash.data());
+  std::string name = "assets/";
+  for (const unsigned char byte : hash) {
+    name += "0123456789abcdef"[byte >> 4];
+    name += "0123456789abcdef"[byte & 15];
+  }
+  return name;
+}
 
 v1::Asset upload_mesh(Connection& connection, const v1::MeshData& mesh) {
   const std::string bytes = mesh.SerializeAsString();
@@ -84,6 +111,30 @@ v1::Scene upload_meshes(Connection& connection, v1::Scene scene) {
         violation.field = "sheets[" + std::to_string(i) + "].triangles." + violation.field;
       throw;
     }
+  }
+  return scene;
+}
+
+Assets assets_of(Connection& connection, const v1::Scene& scene) {
+  Assets assets;
+  for (const auto& sheet : scene.sheets()) {
+    const std::string& name = sheet.triangles().asset();
+    if (name.empty() || assets.contains(name)) continue;
+    try {
+      std::string bytes = download_asset(connection, name);
+      if (asset_name(bytes) == name) assets.emplace(name, std::move(bytes));
+    } catch (const Problem& problem) {  // a server without assets, or another's
+      if (problem.code != "NOT_FOUND" && problem.code != "UNIMPLEMENTED") throw;
+    }
+  }
+  return assets;
+}
+
+v1::Scene with_meshes(v1::Scene scene, const Assets& assets) {
+  for (auto& sheet : *scene.mutable_sheets()) {
+    const auto asset = assets.find(sheet.triangles().asset());
+    if (asset != assets.end())
+      sheet.mutable_triangles()->mutable_data()->ParseFromString(asset->second);
   }
   return scene;
 }

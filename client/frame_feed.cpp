@@ -63,11 +63,25 @@ bool FrameFeed::note(v1::StreamFramesResponse& message) {
     parts_.begin(message.header());
     request_.set_uid(message.header().uid());
     if (!request_.has_start_frame()) request_.set_start_frame(message.header().start_frame());
-    return !std::exchange(header_, message.header());
+    header_ = message.header();
+    if (!request_.format().topology()) return !std::exchange(begun_, true);
+    topology_.begin(*header_);
+    return false;
   }
   if (!header_) {
     throw Problem(Exit::kRefused, "INTERNAL", "HEADER_MISSING",
                   "the server sent something else before the header");
+  }
+  if (message.has_topology()) {
+    topology_.join(*message.mutable_topology());
+    if (!topology_.is_complete()) return false;
+    request_.mutable_format()->clear_topology();  // it stays as it is
+    *message.mutable_header() = *header_;
+    return !std::exchange(begun_, true);
+  }
+  if (!begun_) {
+    throw Problem(Exit::kRefused, "INTERNAL", "TOPOLOGY_MISSING",
+                  "the server sent something else before the triangles of the sheets");
   }
   if (message.has_frame()) {
     if (!parts_.join(*message.mutable_frame())) return false;

@@ -29,6 +29,9 @@ class FrameFeed {
   // requested. Throws what else ends it.
   std::optional<v1::StreamFramesResponse> next();
 
+  // Where it was asked for: there when the header is.
+  const Topology& topology() const { return topology_.topology(); }
+
   int reconnections() const { return reconnections_; }
 
  private:
@@ -41,6 +44,8 @@ class FrameFeed {
   Attempts attempts_;
   std::optional<v1::StreamHeader> header_;  // the latest
   FrameParts parts_;
+  TopologyParts topology_;
+  bool begun_ = false;  // the caller has the header
   int reconnections_ = 0;
 
   std::unique_ptr<grpc::ClientContext> context_;

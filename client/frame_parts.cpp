@@ -9,7 +9,8 @@ namespace weft::client {
 
 void FrameParts::begin(const v1::StreamHeader& header) {
   constexpr std::size_t kMostArrays = 3, kMostBytes = 3 * sizeof(double);
-  most_bytes_ = 1024 + 2 * kMostArrays * kMostBytes * particle_count(header);
+  most_bytes_ =
+      1024 + 2 * kMostBytes * (kMostArrays * particle_count(header) + triangle_count(header));
   frame_.Clear();
 }
 
@@ -24,12 +25,51 @@ bool FrameParts::join(v1::Frame& part) {
     frame_.mutable_positions_m()->append(part.positions_m());
     frame_.mutable_velocities_m_per_s()->append(part.velocities_m_per_s());
     frame_.mutable_normals()->append(part.normals());
+    frame_.mutable_strain()->append(part.strain());
     frame_.set_continued(part.continued());
     part.Swap(&frame_);
   }
   if (!part.continued()) return true;
   frame_.Swap(&part);
   return false;
+}
+
+void TopologyParts::begin(const v1::StreamHeader& header) {
+  header_ = header;
+  topology_.clear();
+  continued_ = false;
+}
+
+bool TopologyParts::join(v1::Topology& part) {
+  const auto check = [&](bool sound) {
+    if (sound) return;
+    throw Problem(
+        Exit::kRefused, "INTERNAL", "TOPOLOGY_UNREADABLE",
+        fmt::format("the server sent triangles of sheet {} that make no sheet", part.sheet()));
+  };
+  check(part.sheet() == static_cast<int>(topology_.size()) - (continued_ ? 1 : 0) &&
+        part.sheet() < header_.sheets_size());
+  if (!continued_) topology_.emplace_back();
+  continued_ = part.continued();
+  v1::MeshData& mesh = topology_.back();
+  mesh.mutable_triangles()->append(part.mesh().triangles());
+  mesh.mutable_flat_m()->append(part.mesh().flat_m());
+  mesh.mutable_flat_triangles()->append(part.mesh().flat_triangles());
+  mesh.mutable_panels()->MergeFrom(part.mesh().panels());
+
+  const v1::SheetLayout& sheet = header_.sheets(part.sheet());
+  const std::size_t most = (particle_count(sheet) + 3 * triangle_count(sheet)) * 2 * sizeof(float);
+  check(mesh.triangles().size() <= most && mesh.flat_m().size() <= most &&
+        mesh.flat_triangles().size() <= most &&
+        static_cast<std::size_t>(mesh.panels_size()) <= triangle_count(sheet));
+  if (continued_) return false;
+  check(is_sound(mesh, sheet));
+  *part.mutable_mesh() = mesh;
+  return true;
+}
+
+bool TopologyParts::is_complete() const {
+  return !continued_ && topology_.size() == static_cast<std::size_t>(header_.sheets_size());
 }
 
 }  // namespace weft::client

@@ -33,25 +33,6 @@ bool are_triangles(const std::string& bytes, std::size_t count, std::size_t corn
   return std::all_of(indices.begin(), indices.end(), [&](auto index) { return index < corners; });
 }
 
-bool is_sound(const v1::MeshData& mesh, const v1::SheetLayout& sheet) {
-  if (is_grid(sheet) && mesh.triangles().empty()) return true;
-  const std::size_t triangles = triangle_count(sheet);
-  const auto flat = values_of<float>(mesh.flat_m());
-  const std::size_t corners = flat.size() / 2;
-  const bool own_corners = !mesh.flat_triangles().empty();
-  std::int64_t in_panels = 0;
-  for (const auto& panel : mesh.panels()) {
-    if (panel.triangle_count() <= 0 || panel.name().empty()) return false;
-    in_panels += panel.triangle_count();
-  }
-  return are_triangles(mesh.triangles(), triangles, particle_count(sheet)) &&
-         mesh.flat_m().size() % (2 * sizeof(float)) == 0 &&
-         std::all_of(flat.begin(), flat.end(), [](float value) { return std::isfinite(value); }) &&
-         (own_corners ? are_triangles(mesh.flat_triangles(), triangles, corners)
-                      : corners == particle_count(sheet)) &&
-         (mesh.panels().empty() || in_panels == static_cast<std::int64_t>(triangles));
-}
-
 SheetMesh mesh_of(const v1::SheetLayout& sheet, const v1::MeshData& from) {
   SheetMesh mesh{.layout = sheet,
                  .triangles = values_of<Triangle>(from.triangles()),
@@ -62,18 +43,18 @@ SheetMesh mesh_of(const v1::SheetLayout& sheet, const v1::MeshData& from) {
     v1::SheetLayout first = sheet;
     first.set_first_particle(0);
     for (const auto& [a, b, c, d] : quads_of(first)) {
-      mesh.triangles.push_back({a, b, c});
-      mesh.triangles.push_back({a, c, d});
+      mesh.triangles.push_back({a, b, d});
+      mesh.triangles.push_back({c, d, b});
     }
   }
   if (mesh.flat_triangles.empty() && !mesh.flat.empty()) mesh.flat_triangles = mesh.triangles;
   std::size_t first = 0;
   for (const auto& panel : from.panels()) {
     const auto count = static_cast<std::size_t>(panel.triangle_count());
-    mesh.panels.push_back({panel.name(), first, count});
+    mesh.panels.push_back({panel.name(), first, count, panel.grain_rad()});
     first += count;
   }
-  if (mesh.panels.empty()) mesh.panels.push_back({sheet.name(), 0, mesh.triangles.size()});
+  if (mesh.panels.empty()) mesh.panels.push_back({sheet.name(), 0, mesh.triangles.size(), 0});
   return mesh;
 }
 
@@ -138,6 +119,25 @@ std::vector<std::uint32_t> triangles_of(const std::vector<v1::SheetLayout>& shee
 
 GridPlace place_in(const v1::SheetLayout& sheet, int particle) {
   return {particle / sheet.columns(), particle % sheet.columns()};
+}
+
+bool is_sound(const v1::MeshData& mesh, const v1::SheetLayout& sheet) {
+  if (is_grid(sheet) && mesh.triangles().empty()) return true;
+  const std::size_t triangles = triangle_count(sheet);
+  const auto flat = values_of<float>(mesh.flat_m());
+  const std::size_t corners = flat.size() / 2;
+  const bool own_corners = !mesh.flat_triangles().empty();
+  std::int64_t in_panels = 0;
+  for (const auto& panel : mesh.panels()) {
+    if (panel.triangle_count() <= 0 || panel.name().empty()) return false;
+    in_panels += panel.triangle_count();
+  }
+  return are_triangles(mesh.triangles(), triangles, particle_count(sheet)) &&
+         mesh.flat_m().size() % (2 * sizeof(float)) == 0 &&
+         std::all_of(flat.begin(), flat.end(), [](float value) { return std::isfinite(value); }) &&
+         (own_corners ? are_triangles(mesh.flat_triangles(), triangles, corners)
+                      : corners == particle_count(sheet)) &&
+         (mesh.panels().empty() || in_panels == static_cast<std::int64_t>(triangles));
 }
 
 bool is_sound(const Topology& topology, const v1::StreamHeader& header) {

@@ -48,7 +48,8 @@ GridPlace place_in(const v1::SheetLayout& sheet, int particle);
 // A mesh of every sheet, as streamed; that of a grid may be empty.
 using Topology = std::vector<v1::MeshData>;
 
-// Whether it is one of the sheets that the header names.
+// Whether they are of the sheets that the header names.
+bool is_sound(const v1::MeshData& mesh, const v1::SheetLayout& sheet);
 bool is_sound(const Topology& topology, const v1::StreamHeader& header);
 
 using Triangle = std::array<std::int32_t, 3>;
@@ -58,6 +59,7 @@ struct PanelRun {
   std::string name;
   std::size_t first = 0;  // triangle
   std::size_t count = 0;
+  double grain_rad = 0;  // from v to the warp, anticlockwise
 };
 
 // A sheet and its triangles.
@@ -69,8 +71,8 @@ struct SheetMesh {
   std::vector<PanelRun> panels;            // together all triangles
 };
 
-// Of every sheet. A grid has its triangles alone, the flat shape where it is in the topology.
-// Precondition: the topology is sound.
+// Of every sheet. A grid has its triangles, as they are streamed, and the flat shape where the
+// topology has it. Precondition: the topology is sound.
 std::vector<SheetMesh> meshes_of(const v1::StreamHeader& header, const Topology& topology);
 
 // "3546 particles, 6890 triangles, 4 panels"

@@ -20,7 +20,9 @@ std::string sheet_path(std::size_t index) { return "sheets[" + std::to_string(in
 
 // Of a particle, at most, m^2/kg.
 double area_by_mass(const SheetDefinition& sheet, const Mesh& mesh) {
-  if (std::holds_alternative<Triangles>(sheet.shape)) return 1 / least_density(sheet);
+  if (std::holds_alternative<Triangles>(sheet.shape) &&
+      std::holds_alternative<MeasuredTextile>(sheet.textile.model))
+    return 1 / least_density(sheet);
   return sheet.spacing() * sheet.spacing() / mesh.mass.minCoeff();
 }
 
@@ -121,7 +123,8 @@ void describe_connections(const SheetDefinition& sheet, const Mesh& mesh, Plan& 
 }
 
 void describe_forces(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan) {
-  if (std::holds_alternative<Triangles>(sheet.shape))
+  if (std::holds_alternative<Triangles>(sheet.shape) &&
+      std::holds_alternative<Isometric>(sheet.bending))
     describe_surface(sheet, mesh, plan);
   else
     describe_connections(sheet, mesh, plan);

@@ -13,7 +13,7 @@ namespace weft {
 
 Mesh make_mesh(const SheetDefinition& sheet);
 
-// Makes what moves a sheet, of which `mesh` was made; `dynamics` outlives it.
+// Makes what moves a sheet, of which `mesh` was made; it and `dynamics` outlive it.
 using SolverFactory = std::function<std::unique_ptr<SheetSolver>(
     const Scene& scene, const SheetDefinition& sheet, const Mesh& mesh, const Dynamics& dynamics)>;
 

@@ -21,14 +21,19 @@ std::optional<double> seconds_of(const v1::Plan& plan, const v1::ServerStats& st
          static_cast<double>(stats.particle_substeps());
 }
 
+std::string shape_text(const v1::Sheet& sheet) {
+  if (sheet.has_grid()) {
+    return fmt::format("{} x {} particles, {:.4g} mm apart", sheet.grid().rows(),
+                       sheet.grid().columns(), sheet.grid().spacing_m() * 1e3);
+  }
+  const std::string& asset = sheet.triangles().asset();
+  return asset.empty() ? "triangles" : "triangles of " + asset;
+}
+
 std::string sheets_text(const v1::Scene& scene) {
   std::string text;
-  for (const auto& sheet : scene.sheets()) {
-    if (!text.empty()) text += ", ";
-    text +=
-        fmt::format("{} ({} x {} particles, {:.4g} mm apart)", sheet.name(), sheet.grid().rows(),
-                    sheet.grid().columns(), sheet.grid().spacing_m() * 1e3);
-  }
+  for (const auto& sheet : scene.sheets())
+    text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", sheet.name(), shape_text(sheet));
   return text;
 }
 

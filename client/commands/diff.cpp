@@ -17,6 +17,11 @@ struct DiffOptions {
 
 std::string length_text(double meters) { return number_text(meters) + " m"; }
 
+std::string place_text(const Comparison& found) {
+  return found.place ? fmt::format("row {}, column {}", found.place->row, found.place->column)
+                     : fmt::format("particle {}", found.particle);
+}
+
 std::string range_text(const RecordingReader& recording) {
   return fmt::format("{} ({} to {})", recording.path(), recording.first_frame(),
                      recording.last_frame());
@@ -30,8 +35,8 @@ std::string text(const RecordingReader& a, const RecordingReader& b, const Compa
     facts.add("not in both", fmt::format("{}, {}", range_text(a), range_text(b)));
   facts.add("rms", length_text(found.rms_m)).add("largest", length_text(found.largest_m));
   if (found.largest_m > 0) {
-    facts.add("at", fmt::format("frame {} ({:.6g} s), {}, row {}, column {}", found.frame,
-                                found.time_s, found.sheet, found.row, found.column));
+    facts.add("at", fmt::format("frame {} ({:.6g} s), {}, {}", found.frame, found.time_s,
+                                found.sheet, place_text(found)));
   }
   facts.add("bit-equal", found.first_unequal
                              ? fmt::format("no, frame {} is the first", *found.first_unequal)
@@ -41,17 +46,21 @@ std::string text(const RecordingReader& a, const RecordingReader& b, const Compa
 }
 
 Json json(const Comparison& found) {
+  Json largest{{"distance_m", found.largest_m},
+               {"frame", found.frame},
+               {"time_s", found.time_s},
+               {"sheet", found.sheet}};
+  if (found.place) {
+    largest["row"] = found.place->row;
+    largest["column"] = found.place->column;
+  } else {
+    largest["particle"] = found.particle;
+  }
   return {{"first_frame", found.first_frame},
           {"last_frame", found.last_frame},
           {"same_frames", found.same_frames},
           {"rms_m", found.rms_m},
-          {"largest",
-           {{"distance_m", found.largest_m},
-            {"frame", found.frame},
-            {"time_s", found.time_s},
-            {"sheet", found.sheet},
-            {"row", found.row},
-            {"column", found.column}}},
+          {"largest", std::move(largest)},
           {"bit_equal", found.bit_equal()},
           {"first_unequal_frame", found.first_unequal ? Json(*found.first_unequal) : Json()}};
 }

@@ -36,20 +36,21 @@ void add_export(CLI::App& app, Context& context) {
   const std::map<std::string, ExportFormat> formats{
       {"obj", ExportFormat::kObj},   {"pc2", ExportFormat::kPc2}, {"mdd", ExportFormat::kMdd},
       {"gltf", ExportFormat::kGltf}, {"vtk", ExportFormat::kVtk}, {"usda", ExportFormat::kUsda},
-      {"csv", ExportFormat::kCsv}};
+      {"npz", ExportFormat::kNpz},   {"csv", ExportFormat::kCsv}};
   auto options = std::make_shared<ExportOptions>();
   ExportOrder& order = options->order;
   CLI::App* command =
       app.add_subcommand("export", "Write a recording as files that other tools open");
   command->add_option("FILE", options->recording, "Recording")->option_text(" ")->required();
   command
-      ->add_option("-f,--format", order.format,
-                   "obj: a directory of meshes\npc2, mdd: point caches\n"
-                   "gltf: an animated mesh, .glb\nvtk: a collection of meshes, .pvd\n"
-                   "usda: an animated mesh in USD text\ncsv: a row for every frame")
+      ->add_option(
+          "-f,--format", order.format,
+          "obj: a directory of meshes\npc2, mdd: point caches\n"
+          "gltf: an animated mesh, .glb\nvtk: a collection of meshes, .pvd\n"
+          "usda: an animated mesh in USD text\nnpz: arrays of NumPy\ncsv: a row for every frame")
       ->required()
       ->transform(one_of(formats))
-      ->option_text("obj|pc2|mdd|gltf|vtk|usda|csv, REQUIRED");
+      ->option_text("obj|pc2|mdd|gltf|vtk|usda|npz|csv, REQUIRED");
   command->add_option("-o,--output", order.path, "File to write; for obj a directory")
       ->type_name("PATH")
       ->required();

@@ -10,11 +10,11 @@
 namespace weft::client {
 namespace {
 
-std::string sheets_text(const v1::StreamHeader& header) {
+std::string sheets_text(const RecordingReader& recording) {
   std::string text;
-  for (const auto& sheet : header.sheets()) {
-    text += fmt::format("{}{} ({} x {} particles)", text.empty() ? "" : ", ", sheet.name(),
-                        sheet.rows(), sheet.columns());
+  for (const SheetMesh& sheet : meshes_of(recording.header(), recording.topology())) {
+    text +=
+        fmt::format("{}{} ({})", text.empty() ? "" : ", ", sheet.layout.name(), shape_text(sheet));
   }
   return text;
 }
@@ -39,7 +39,7 @@ std::string facts_text(const RecordingReader& recording, const Inspection& inspe
       .add("session", header.session())
       .add("uid", header.uid())
       .add("numerics", header.numerics_id())
-      .add("sheets", sheets_text(header))
+      .add("sheets", sheets_text(recording))
       .add("content",
            fmt::format("positions{}, {}", header.format().velocities() ? ", velocities" : "",
                        numbers_text(header.format())))

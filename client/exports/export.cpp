@@ -17,21 +17,36 @@ constexpr double kSameTime = 1e-9;  // s
 
 // The particles that are exported, and their sheets counted from the first of them.
 struct Part {
-  std::vector<v1::SheetLayout> sheets;
+  std::vector<SheetMesh> sheets;
   std::size_t first = 0;
   std::size_t count = 0;
 };
 
+// Lies as it starts.
+void set_flat_shape(SheetMesh& mesh, const v1::Grid& grid) {
+  for (std::size_t i = 0; i < particle_count(mesh.layout); ++i) {
+    const GridPlace place = place_in(mesh.layout, static_cast<int>(i));
+    mesh.flat.push_back({static_cast<float>(place.row * grid.spacing_m()),
+                         static_cast<float>(place.column * grid.spacing_m())});
+  }
+  mesh.flat_triangles = mesh.triangles;
+}
+
 Part find_part(const RecordingReader& recording, const std::string& name) {
   Part part;
   std::string names;
-  for (const auto& sheet : recording.header().sheets()) {
+  int index = -1;
+  for (SheetMesh& mesh : meshes_of(recording.header(), recording.topology())) {
+    v1::SheetLayout& sheet = mesh.layout;
+    ++index;
     names += (names.empty() ? "" : ", ") + sheet.name();
     if (!name.empty() && sheet.name() != name) continue;
     if (part.sheets.empty()) part.first = static_cast<std::size_t>(sheet.first_particle());
-    part.sheets.push_back(sheet);
-    part.sheets.back().set_first_particle(static_cast<std::int32_t>(part.count));
+    sheet.set_first_particle(static_cast<std::int32_t>(part.count));
     part.count += particle_count(sheet);
+    if (mesh.flat.empty() && index < recording.scene().sheets_size())
+      set_flat_shape(mesh, recording.scene().sheets(index).grid());
+    part.sheets.push_back(std::move(mesh));
   }
   if (part.sheets.empty()) {
     throw usage_problem(
@@ -85,11 +100,15 @@ std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& p
     case ExportFormat::kMdd:
       return make_mdd_writer(order.path, part.count, numbers.size());
     case ExportFormat::kGltf:
-      return make_gltf_writer(order.path, part.sheets, part.count, numbers.size());
+      return make_gltf_writer(order.path, part.sheets, numbers.size());
     case ExportFormat::kVtk:
       return make_vtk_writer(order.path, part.sheets);
     case ExportFormat::kUsda:
       return make_usd_writer(order.path, part.sheets, stage_of(recording, numbers));
+    case ExportFormat::kNpz:
+      return make_npz_writer(
+          order.path, part.sheets, numbers.size(),
+          1 / (recording.header().frame_step_s() * static_cast<double>(order.every)));
     case ExportFormat::kCsv:
       return make_csv_writer(order.path, part.count);
   }

@@ -10,7 +10,7 @@
 
 namespace weft::client {
 
-enum class ExportFormat { kObj, kPc2, kMdd, kGltf, kVtk, kUsda, kCsv };
+enum class ExportFormat { kObj, kPc2, kMdd, kGltf, kVtk, kUsda, kNpz, kCsv };
 
 // What is exported, and where to.
 struct ExportOrder {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/recording/points.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 
@@ -32,23 +33,27 @@ std::unique_ptr<FrameWriter> make_csv_writer(const std::string& path, std::size_
 std::unique_ptr<FrameWriter> make_pc2_writer(const std::string& path, std::size_t particles,
                                              std::int64_t first_frame);
 
-// A directory of files cloth_000123.obj with the cells of the sheets as quads.
+// A directory of files cloth_000123.obj with the cells of grids as quads; triangles with normals
+// and the flat shape, in a group for each panel.
 std::unique_ptr<FrameWriter> make_obj_writer(const std::string& directory,
-                                             std::vector<v1::SheetLayout> sheets);
+                                             std::vector<SheetMesh> sheets);
 
 // Point cache of LightWave, Blender and Marvelous Designer, float32.
 std::unique_ptr<FrameWriter> make_mdd_writer(const std::string& path, std::size_t particles,
                                              std::size_t frames);
 
 // Binary glTF 2.0: the cells as triangles with normals, the first frame as the mesh, the others as
-// morph targets of an animation.
+// morph targets of an animation. Where there are sheets of triangles each panel is a primitive; a
+// particle that has several corners in the flat shape is as many vertices, and attribute _PARTICLE
+// says which one it is.
 std::unique_ptr<FrameWriter> make_gltf_writer(const std::string& path,
-                                              const std::vector<v1::SheetLayout>& sheets,
-                                              std::size_t particles, std::size_t frames);
+                                              const std::vector<SheetMesh>& sheets,
+                                              std::size_t frames);
 
-// ParaView's collection x.pvd, and a directory x of meshes frame_000123.vtp, float64.
+// ParaView's collection x.pvd, and a directory x of meshes frame_000123.vtp, float64. Where there
+// are sheets of triangles each cell says its panel, and u and v of its corners.
 std::unique_ptr<FrameWriter> make_vtk_writer(const std::string& path,
-                                             const std::vector<v1::SheetLayout>& sheets);
+                                             const std::vector<SheetMesh>& sheets);
 
 // What USD needs to know of time and space; a frame's time code is its number.
 struct UsdStage {
@@ -59,9 +64,17 @@ struct UsdStage {
 };
 
 // USD text: one mesh of all sheets, its faces in a subset for each; points as time samples,
-// float32.
+// float32. Where there are sheets of triangles each panel is a subset, too, and the flat shape is
+// primvars:st.
 std::unique_ptr<FrameWriter> make_usd_writer(const std::string& path,
-                                             const std::vector<v1::SheetLayout>& sheets,
+                                             const std::vector<SheetMesh>& sheets,
                                              const UsdStage& stage);
+
+// Arrays of NumPy: vertices_seq (frames, particles, 3) float32, faces (triangles, 3) int32,
+// vertices_uv (corners, 2) float32, faces_uv (triangles, 3) int32, panel (triangles) int32,
+// panel_names, fps.
+std::unique_ptr<FrameWriter> make_npz_writer(const std::string& path,
+                                             const std::vector<SheetMesh>& sheets,
+                                             std::size_t frames, double frames_per_second);
 
 }  // namespace weft::client

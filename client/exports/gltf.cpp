@@ -5,8 +5,11 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <string_view>
+#include <utility>
 
+#include "client/exports/faces.h"
 #include "client/exports/frame_writer.h"
 #include "client/exports/normals.h"
 #include "client/exports/output_file.h"
@@ -56,17 +59,81 @@ Bounds bounds_of(const Vectors& vectors) {
   return bounds;
 }
 
+// Triangles cut out of one piece, as indices of vertices.
+struct Primitive {
+  std::string panel;  // empty: it is not said
+  std::vector<std::uint32_t> indices;
+};
+
+// What is drawn. Grids alone are one primitive whose vertices are the particles; panels have
+// vertices of their own where corners of the flat shape differ.
+struct Drawing {
+  explicit Drawing(const std::vector<SheetMesh>& sheets) {
+    const bool with_panels = have_panels(sheets);
+    if (!with_panels) primitives.emplace_back();
+    for (const SheetMesh& sheet : sheets) {
+      const Faces faces = faces_of(sheet);
+      const auto in_sheet = triangles_of(faces);
+      triangles.insert(triangles.end(), in_sheet.begin(), in_sheet.end());
+      if (!with_panels) {
+        for (std::size_t i = 0; i < particle_count(sheet.layout); ++i)
+          particles.push_back(static_cast<std::uint32_t>(particles.size()));
+        continue;
+      }
+      Faces corners = faces;
+      corners.particles = faces.flat;
+      add_panels(sheet, in_sheet, triangles_of(corners));
+    }
+    if (!with_panels) primitives[0].indices = triangles;
+  }
+
+  std::size_t index_count() const { return triangles.size(); }
+  bool has_flat_shape() const { return !flat.empty(); }
+
+  std::vector<std::uint32_t> particles;    // of each vertex
+  std::vector<std::array<float, 2>> flat;  // of each vertex, where panels are told
+  std::vector<Primitive> primitives;       // with all triangles
+  std::vector<std::uint32_t> triangles;    // the same, as particles
+
+ private:
+  void add_panels(const SheetMesh& sheet, const std::vector<std::uint32_t>& in_space,
+                  const std::vector<std::uint32_t>& in_flat) {
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> vertices;
+    for (const PanelRun& panel : sheet.panels) {
+      Primitive& primitive = primitives.emplace_back();
+      primitive.panel = panel.name;
+      for (std::size_t i = 3 * panel.first; i < 3 * (panel.first + panel.count); ++i) {
+        const auto next = static_cast<std::uint32_t>(particles.size());
+        const auto [vertex, added] = vertices.try_emplace({in_space[i], in_flat[i]}, next);
+        primitive.indices.push_back(vertex->second);
+        if (!added) continue;
+        particles.push_back(in_space[i]);
+        const auto& [u, v] = sheet.flat[in_flat[i]];
+        flat.push_back({u, 1 - v});  // of textures v runs down
+      }
+    }
+  }
+};
+
+Vectors at_vertices(const Vectors& of_particles, const std::vector<std::uint32_t>& particles) {
+  Vectors result(particles.size());
+  for (std::size_t i = 0; i < result.size(); ++i) result[i] = of_particles[particles[i]];
+  return result;
+}
+
 // The file's JSON comes before the arrays that it describes, so room is left for it: its length is
 // known but for the digits of the bounds.
 class GltfWriter : public FrameWriter {
  public:
-  GltfWriter(const std::string& path, const std::vector<v1::SheetLayout>& sheets,
-             std::size_t particles, std::size_t frames)
-      : file_(path), particles_(particles), triangles_(triangles_of(sheets)), bounds_(frames) {
+  GltfWriter(const std::string& path, Drawing drawing, std::size_t frames)
+      : file_(path), drawing_(std::move(drawing)), bounds_(frames) {
     json_room_ = json_text().size() + frames * 6 * kLongestNumber;
     json_room_ += (4 - json_room_ % 4) % 4;
     file_.write(std::string(20 + json_room_ + 8, ' '));
-    file_.write(bytes_of(triangles_));
+    for (const Primitive& primitive : drawing_.primitives) file_.write(bytes_of(primitive.indices));
+    if (!drawing_.has_flat_shape()) return;
+    file_.write(bytes_of(drawing_.flat));
+    file_.write(bytes_of(std::vector<float>(drawing_.particles.begin(), drawing_.particles.end())));
   }
 
   void add(const ExportFrame& frame) override {
@@ -74,8 +141,8 @@ class GltfWriter : public FrameWriter {
     const auto time = static_cast<float>(frame.time_s - start_);
     if (!times_.empty() && time <= times_.back())
       throw usage_problem("--times: those of an animation increase");
-    Vectors positions = positions_of(frame.points);
-    Vectors normals = normals_of(frame.points, triangles_);
+    Vectors positions = at_vertices(positions_of(frame.points), drawing_.particles);
+    Vectors normals = at_vertices(normals_of(frame.points, drawing_.triangles), drawing_.particles);
     if (times_.empty()) {
       base_positions_ = positions;
       base_normals_ = normals;
@@ -111,8 +178,10 @@ class GltfWriter : public FrameWriter {
     file_.close();
   }
 
-  static void check(std::size_t particles, std::size_t cells, std::size_t frames) {
-    const std::size_t bytes = 24 * (cells + particles * frames) + 4 * frames * frames;
+  static void check(const Drawing& drawing, std::size_t frames) {
+    const std::size_t particles = drawing.particles.size();
+    const std::size_t bytes =
+        4 * drawing.index_count() + (12 + 24 * frames) * particles + 4 * frames * frames;
     if (frames > kMostFrames || bytes > std::numeric_limits<std::uint32_t>::max() / 2) {
       throw usage_problem(fmt::format(
           "{} frames of {} particles are too much for glTF, which takes {} frames and 2 GiB: "
@@ -124,8 +193,9 @@ class GltfWriter : public FrameWriter {
  private:
   std::size_t binary_size() const {
     const std::size_t frames = bounds_.size();
-    return 4 * triangles_.size() + 24 * particles_ * frames +
-           (frames > 1 ? 4 * frames * frames : 0);
+    const std::size_t vertices = drawing_.particles.size();
+    return 4 * drawing_.index_count() + (drawing_.has_flat_shape() ? 12 * vertices : 0) +
+           24 * vertices * frames + (frames > 1 ? 4 * frames * frames : 0);
   }
 
   // One view of the binary chunk for every array, in the order in which they are written.
@@ -151,16 +221,31 @@ class GltfWriter : public FrameWriter {
   std::string json_text() const {
     const std::size_t frames = bounds_.size();
     Arrays arrays;
-    const std::size_t indices = arrays.add(kUnsignedInt, "SCALAR", 1, triangles_.size(), kIndices);
+    const std::size_t vertices = drawing_.particles.size();
+    std::vector<std::size_t> indices;
+    for (const Primitive& primitive : drawing_.primitives)
+      indices.push_back(arrays.add(kUnsignedInt, "SCALAR", 1, primitive.indices.size(), kIndices));
+    Json flat_shape = Json::object();
+    if (drawing_.has_flat_shape()) {
+      flat_shape["TEXCOORD_0"] = arrays.add(kFloat, "VEC2", 2, vertices, kVertices);
+      flat_shape["_PARTICLE"] = arrays.add(kFloat, "SCALAR", 1, vertices, kVertices);
+    }
     Json shapes = Json::array();
     for (const Bounds& bounds : bounds_) {
-      const std::size_t positions = arrays.add(kFloat, "VEC3", 3, particles_, kVertices);
+      const std::size_t positions = arrays.add(kFloat, "VEC3", 3, vertices, kVertices);
       arrays.accessors[positions]["min"] = bounds.low;
       arrays.accessors[positions]["max"] = bounds.high;
-      const std::size_t normals = arrays.add(kFloat, "VEC3", 3, particles_, kVertices);
+      const std::size_t normals = arrays.add(kFloat, "VEC3", 3, vertices, kVertices);
       shapes.push_back({{"POSITION", positions}, {"NORMAL", normals}});
     }
-    Json mesh{{"attributes", shapes[0]}, {"indices", indices}, {"material", 0}};
+    Json attributes = shapes[0];
+    attributes.update(flat_shape);
+    Json primitives = Json::array();
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+      primitives.push_back({{"attributes", attributes}, {"indices", indices[i]}, {"material", 0}});
+      const std::string& panel = drawing_.primitives[i].panel;
+      if (!panel.empty()) primitives.back()["extras"] = {{"panel", panel}};
+    }
     Json json{{"asset", {{"version", "2.0"}, {"generator", "weft " WEFT_VERSION}}},
               {"scene", 0},
               {"scenes", {{{"nodes", {0}}}}},
@@ -173,7 +258,7 @@ class GltfWriter : public FrameWriter {
                    {"roughnessFactor", 0.9}}}}}}};
     if (frames > 1) {
       shapes.erase(0);
-      mesh["targets"] = std::move(shapes);
+      for (Json& primitive : primitives) primitive["targets"] = shapes;
       const std::size_t times = arrays.add(kFloat, "SCALAR", 1, frames, 0);
       arrays.accessors[times]["min"] = {times_.empty() ? 0.0F : times_.front()};
       arrays.accessors[times]["max"] = {times_.empty() ? 0.0F : times_.back()};
@@ -182,7 +267,7 @@ class GltfWriter : public FrameWriter {
           {{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}}},
            {"samplers", {{{"input", times}, {"output", weights}, {"interpolation", "LINEAR"}}}}}};
     }
-    json["meshes"] = {{{"primitives", {std::move(mesh)}}}};
+    json["meshes"] = {{{"primitives", std::move(primitives)}}};
     json["buffers"] = {{{"byteLength", arrays.bytes}}};
     json["bufferViews"] = std::move(arrays.views);
     json["accessors"] = std::move(arrays.accessors);
@@ -190,8 +275,7 @@ class GltfWriter : public FrameWriter {
   }
 
   OutputFile file_;
-  std::size_t particles_;
-  std::vector<std::uint32_t> triangles_;
+  Drawing drawing_;
   std::vector<Bounds> bounds_;  // of every frame's positions
   std::vector<float> times_;    // from the first frame on, s
   double start_ = 0;            // s
@@ -203,12 +287,11 @@ class GltfWriter : public FrameWriter {
 }  // namespace
 
 std::unique_ptr<FrameWriter> make_gltf_writer(const std::string& path,
-                                              const std::vector<v1::SheetLayout>& sheets,
-                                              std::size_t particles, std::size_t frames) {
-  std::size_t cells = 0;
-  for (const auto& sheet : sheets) cells += quads_of(sheet).size();
-  GltfWriter::check(particles, cells, frames);
-  return std::make_unique<GltfWriter>(path, sheets, particles, frames);
+                                              const std::vector<SheetMesh>& sheets,
+                                              std::size_t frames) {
+  Drawing drawing(sheets);
+  GltfWriter::check(drawing, frames);
+  return std::make_unique<GltfWriter>(path, std::move(drawing), frames);
 }
 
 }  // namespace weft::client

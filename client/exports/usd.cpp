@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "client/exports/faces.h"
 #include "client/exports/frame_writer.h"
 #include "client/exports/output_file.h"
 #include "client/problem.h"
@@ -29,8 +30,7 @@ std::string list_of(const Numbers& numbers) {
 
 class UsdWriter : public FrameWriter {
  public:
-  UsdWriter(const std::string& path, const std::vector<v1::SheetLayout>& sheets,
-            const UsdStage& stage)
+  UsdWriter(const std::string& path, const std::vector<SheetMesh>& sheets, const UsdStage& stage)
       : file_(checked(path)) {
     file_.write(
         fmt::format("#usda 1.0\n(\n"
@@ -43,22 +43,21 @@ class UsdWriter : public FrameWriter {
                     "    upAxis = \"{}\"\n)\n\n",
                     stage.last_frame, stage.frames_per_second, stage.first_frame,
                     stage.frames_per_second, stage.up_axis));
-    std::vector<std::int32_t> corners;
-    std::set<std::string> names;
-    for (const auto& sheet : sheets) {
-      const std::size_t before = corners.size() / 4;
-      for (const Quad& quad : quads_of(sheet))
-        corners.insert(corners.end(), quad.begin(), quad.end());
-      std::vector<std::size_t> faces(corners.size() / 4 - before);
-      for (std::size_t i = 0; i < faces.size(); ++i) faces[i] = before + i;
-      std::string name = identifier(sheet.name());
-      while (!names.insert(name).second) name += '_';
-      subsets_ += fmt::format(
-          "\n    def GeomSubset \"{}\"\n    {{\n"
-          "        uniform token elementType = \"face\"\n"
-          "        uniform token familyName = \"sheets\"\n"
-          "        int[] indices = {}\n    }}\n",
-          name, list_of(faces));
+    std::vector<std::int32_t> particles, counts;
+    std::vector<std::array<float, 2>> corners;
+    for (const SheetMesh& sheet : sheets) {
+      const Faces faces = faces_of(sheet);
+      const std::size_t before = counts.size();
+      counts.insert(counts.end(), faces.count(), static_cast<std::int32_t>(faces.corners));
+      particles.insert(particles.end(), faces.particles.begin(), faces.particles.end());
+      add_subset("sheets", sheet.layout.name(), before, faces.count());
+      if (!have_panels(sheets)) continue;
+      for (const std::int32_t corner : faces.flat)
+        corners.push_back(sheet.flat[static_cast<std::size_t>(corner)]);
+      if (is_grid(sheet.layout)) continue;
+      for (const PanelRun& panel : sheet.panels)
+        add_subset("panels", sheet.layout.name() + '_' + panel.name, before + panel.first,
+                   panel.count);
     }
     file_.write(
         fmt::format("def Mesh \"cloth\"\n{{\n"
@@ -66,8 +65,9 @@ class UsdWriter : public FrameWriter {
                     "    uniform token subdivisionScheme = \"none\"\n"
                     "    int[] faceVertexCounts = {}\n"
                     "    int[] faceVertexIndices = {}\n"
+                    "{}"
                     "    point3f[] points.timeSamples = {{\n",
-                    list_of(std::vector<int>(corners.size() / 4, 4)), list_of(corners)));
+                    list_of(counts), list_of(particles), flat_text(corners)));
   }
 
   void add(const ExportFrame& frame) override {
@@ -104,15 +104,39 @@ class UsdWriter : public FrameWriter {
     return path;
   }
 
+  void add_subset(const char* family, const std::string& title, std::size_t first,
+                  std::size_t count) {
+    std::vector<std::size_t> faces(count);
+    for (std::size_t i = 0; i < count; ++i) faces[i] = first + i;
+    std::string name = identifier(title);
+    while (!names_.insert(name).second) name += '_';
+    subsets_ += fmt::format(
+        "\n    def GeomSubset \"{}\"\n    {{\n"
+        "        uniform token elementType = \"face\"\n"
+        "        uniform token familyName = \"{}\"\n"
+        "        int[] indices = {}\n    }}\n",
+        name, family, list_of(faces));
+  }
+
+  static std::string flat_text(const std::vector<std::array<float, 2>>& corners) {
+    if (corners.empty()) return {};
+    std::string text = "    texCoord2f[] primvars:st = [";
+    for (std::size_t i = 0; i < corners.size(); ++i)
+      fmt::format_to(std::back_inserter(text), "{}({})", i == 0 ? "" : ", ",
+                     fmt::join(corners[i], ", "));
+    return text + "] (\n        interpolation = \"faceVarying\"\n    )\n";
+  }
+
   OutputFile file_;
-  std::string extents_;  // a line a frame
+  std::set<std::string> names_;  // of subsets
+  std::string extents_;          // a line a frame
   std::string subsets_;
 };
 
 }  // namespace
 
 std::unique_ptr<FrameWriter> make_usd_writer(const std::string& path,
-                                             const std::vector<v1::SheetLayout>& sheets,
+                                             const std::vector<SheetMesh>& sheets,
                                              const UsdStage& stage) {
   return std::make_unique<UsdWriter>(path, sheets, stage);
 }

@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <string_view>
 #include <system_error>
 
+#include "client/exports/faces.h"
 #include "client/exports/frame_writer.h"
 #include "client/exports/output_file.h"
 #include "client/problem.h"
@@ -34,13 +36,24 @@ class Appended {
 
 class VtkWriter : public FrameWriter {
  public:
-  VtkWriter(const std::string& path, const std::vector<v1::SheetLayout>& sheets)
+  VtkWriter(const std::string& path, const std::vector<SheetMesh>& sheets)
       : directory_(directory_of(path)), collection_(path) {
-    for (const auto& sheet : sheets) {
-      for (const Quad& quad : quads_of(sheet)) {
-        corners_.insert(corners_.end(), quad.begin(), quad.end());
+    const bool with_panels = have_panels(sheets);
+    for (const SheetMesh& sheet : sheets) {
+      const Faces faces = faces_of(sheet);
+      for (std::size_t face = 0; face < faces.count(); ++face) {
+        const std::size_t first = face * faces.corners;
+        for (std::size_t i = first; i < first + faces.corners; ++i)
+          corners_.push_back(faces.particles[i]);
         ends_.push_back(static_cast<std::int32_t>(corners_.size()));
+        if (!with_panels) continue;
+        for (std::size_t k = 0; k < kMostCorners; ++k) {
+          const std::size_t corner = first + std::min(k, faces.corners - 1);
+          const auto& uv = sheet.flat[static_cast<std::size_t>(faces.flat[corner])];
+          flat_.insert(flat_.end(), uv.begin(), uv.end());
+        }
       }
+      if (with_panels) add_panels(sheet, faces.count());
     }
     collection_.write(
         "<?xml version=\"1.0\"?>\n"
@@ -74,6 +87,14 @@ class VtkWriter : public FrameWriter {
     return directory;
   }
 
+  static constexpr std::size_t kMostCorners = 4;
+
+  void add_panels(const SheetMesh& sheet, std::size_t faces) {
+    if (is_grid(sheet.layout)) panels_.insert(panels_.end(), faces, panel_++);
+    for (const PanelRun& panel : sheet.panels)
+      if (!is_grid(sheet.layout)) panels_.insert(panels_.end(), panel.count, panel_++);
+  }
+
   std::string mesh_text(const Points& points) const {
     std::vector<double> values;
     values.reserve(3 * points.x.size());
@@ -89,21 +110,32 @@ class VtkWriter : public FrameWriter {
     text += "<Points>\n" + arrays.add("Float64", "NumberOfComponents=\"3\"", bytes_of(values)) +
             "</Points>\n<Polys>\n" +
             arrays.add("Int32", "Name=\"connectivity\"", bytes_of(corners_)) +
-            arrays.add("Int32", "Name=\"offsets\"", bytes_of(ends_)) +
-            "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">_";
+            arrays.add("Int32", "Name=\"offsets\"", bytes_of(ends_)) + "</Polys>\n" +
+            cell_data(arrays) + "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">_";
     return text + arrays.bytes() + "</AppendedData>\n</VTKFile>\n";
+  }
+
+  // Where there are panels; the last corner of a triangle stands twice.
+  std::string cell_data(Appended& arrays) const {
+    if (panels_.empty()) return {};
+    return "<CellData>\n" + arrays.add("Int32", "Name=\"panel\"", bytes_of(panels_)) +
+           arrays.add("Float32", "Name=\"uv\" NumberOfComponents=\"8\"", bytes_of(flat_)) +
+           "</CellData>\n";
   }
 
   std::filesystem::path directory_;
   OutputFile collection_;
   std::vector<std::int32_t> corners_;
-  std::vector<std::int32_t> ends_;  // of each cell in corners_
+  std::vector<std::int32_t> ends_;    // of each cell in corners_
+  std::vector<std::int32_t> panels_;  // of each cell
+  std::int32_t panel_ = 0;            // so many so far
+  std::vector<float> flat_;           // u and v of kMostCorners of each cell, m
 };
 
 }  // namespace
 
 std::unique_ptr<FrameWriter> make_vtk_writer(const std::string& path,
-                                             const std::vector<v1::SheetLayout>& sheets) {
+                                             const std::vector<SheetMesh>& sheets) {
   return std::make_unique<VtkWriter>(path, sheets);
 }
 

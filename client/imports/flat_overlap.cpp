@@ -9,7 +9,7 @@
 namespace weft::client {
 namespace {
 
-constexpr std::size_t kMostTold = 100;
+constexpr std::size_t kMostOverlaps = 100;
 constexpr double kTouch = 1e-5;  // how deep rounded neighbours may lie in each other, of an edge
 
 // Whether all of b lies outside an edge of a; both run anticlockwise.
@@ -62,7 +62,7 @@ std::vector<std::pair<int, int>> find_overlaps(const ImportedMesh& mesh) {
         continue;
       overlaps.emplace_back(std::min(each->triangle, piece.triangle),
                             std::max(each->triangle, piece.triangle));
-      if (overlaps.size() == kMostTold) return overlaps;
+      if (overlaps.size() == kMostOverlaps) return overlaps;
     }
     open.push_back(&piece);
   }

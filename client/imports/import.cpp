@@ -137,9 +137,9 @@ void mend_slivers(ImportedMesh& mesh) {
         count_of(done.particles, "particle"), done.height * 1e3, done.longest * 1e3,
         done.area_change * 100));
   if (done.left > 0)
-    mesh.notes.push_back(fmt::format("{} lower than {:.3g} mm {} left, at borders and seams",
-                                     count_of(done.left, "triangle"), done.height * 1e3,
-                                     done.left == 1 ? "is" : "are"));
+    mesh.notes.push_back(fmt::format(
+        "{} lower than {:.3g} mm {} left, at borders and seams or without a short edge",
+        count_of(done.left, "triangle"), done.height * 1e3, done.left == 1 ? "is" : "are"));
   note(mesh, drop_empty_triangles(mesh), "triangle", "dropped that have no area");
 }
 

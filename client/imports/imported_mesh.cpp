@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "client/output/text.h"
@@ -47,7 +48,9 @@ std::string surroundings(const ImportedMesh& mesh, int triangle) {
 }
 
 std::string position_text(const Vector3d& position) {
-  return fmt::format("({:.4g}, {:.4g}, {:.4g})", position.x(), position.y(), position.z());
+  const auto shown = [](double x) { return std::round(x * 1e6) / 1e6 + 0.0; };  // -0 is 0
+  return fmt::format("({:.4g}, {:.4g}, {:.4g})", shown(position.x()), shown(position.y()),
+                     shown(position.z()));
 }
 
 std::string plain_name(std::string_view text, std::string_view without) {

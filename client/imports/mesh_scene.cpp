@@ -19,16 +19,17 @@ void set_textiles(v1::Sheet& sheet, const MeshSceneOptions& options) {
   sheet.mutable_textile()->set_damping_kg_per_s(kDamping);
   if (options.textile) sheet.mutable_textile()->MergeFrom(*options.textile);
   auto& panels = *sheet.mutable_triangles()->mutable_data()->mutable_panels();
-  for (const auto& [name, textile] : options.panel_textiles) {
-    const auto found = std::find_if(panels.begin(), panels.end(),
-                                    [&](const v1::Panel& panel) { return panel.name() == name; });
+  for (const auto& given : options.panel_textiles) {
+    const auto found = std::find_if(panels.begin(), panels.end(), [&](const v1::Panel& panel) {
+      return panel.name() == given.first;
+    });
     if (found == panels.end()) {
       std::vector<std::string> names;
       for (const v1::Panel& panel : panels) names.push_back(panel.name());
       throw usage_problem(fmt::format("--panel-textile: the mesh has no panel \"{}\"; it has {}",
-                                      name, fmt::join(names, ", ")));
+                                      given.first, fmt::join(names, ", ")));
     }
-    *found->mutable_textile() = textile;
+    *found->mutable_textile() = given.second;
   }
 }
 

@@ -181,12 +181,16 @@ class Reading {
       by = kind;
       mesh_.panels_by = name;
     }
+    // one panel has the first name that there is
+    const Face& first = faces_[0];
+    const int only = first.group != 0      ? first.group
+                     : first.material != 0 ? first.material
+                                           : first.object;
     std::vector<int> panel_of(names_.size(), -1);
     for (const auto& source : mesh_.source) {
-      const int name = by == nullptr ? 0 : faces_[static_cast<std::size_t>(source.face) - 1].*by;
-      int& panel = panel_of[static_cast<std::size_t>(name)];
-      if (panel < 0)
-        panel = add_panel(mesh_, by == nullptr ? "" : names_[static_cast<std::size_t>(name)]);
+      const int name = by == nullptr ? only : faces_[as_index(source.face) - 1].*by;
+      int& panel = panel_of[as_index(name)];
+      if (panel < 0) panel = add_panel(mesh_, names_[as_index(name)]);
       mesh_.panel.push_back(panel);
     }
   }

@@ -25,8 +25,10 @@ struct Move {
 // Triangles around particles, kept as they are joined.
 class Joining {
  public:
-  explicit Joining(ImportedMesh& mesh)
+  // Longer ways change the mesh more than they mend.
+  Joining(ImportedMesh& mesh, double longest)
       : mesh_(mesh),
+        longest_(longest),
         around_(mesh.positions.size()),
         fixed_(mesh.positions.size(), false),
         alive_(mesh.triangles.size(), true) {
@@ -104,7 +106,8 @@ class Joining {
   }
 
   bool may(const Move& move, int corner, double height) const {
-    if (fixed_[as_index(move.from)] || !share_two(move.from, move.to)) return false;
+    if (move.way > longest_ || fixed_[as_index(move.from)] || !share_two(move.from, move.to))
+      return false;
     for (const int t : around_[as_index(move.from)]) {
       if (has(t, move.to)) {
         if (corner_of(t, move.to) != corner) return false;
@@ -137,6 +140,7 @@ class Joining {
   }
 
   ImportedMesh& mesh_;
+  double longest_;
   std::vector<std::vector<int>> around_;
   std::vector<bool> fixed_, alive_;
 };
@@ -169,7 +173,7 @@ Collapse collapse_slivers(ImportedMesh& mesh, double part) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) heights.push_back(least_height(mesh, t));
   Collapse result{.height = part * median(std::move(heights))};
   const double area = flat_area(mesh);
-  Joining joining(mesh);
+  Joining joining(mesh, 2 * result.height);
   bool moved = true;
   for (int pass = 0; pass < kPasses && moved; ++pass) {
     moved = false;

@@ -42,6 +42,11 @@ void check_layouts(const RecordingReader& a, const RecordingReader& b) {
     const std::string one = sheet_text(left.sheets(i));
     const std::string other = sheet_text(right.sheets(i));
     if (one != other) refuse(a, b, fmt::format("sheet {} is {} and {}", i + 1, one, other));
+    const auto triangles = [i](const RecordingReader& recording) -> const std::string& {
+      return recording.topology()[static_cast<std::size_t>(i)].triangles();
+    };
+    if (!is_grid(left.sheets(i)) && triangles(a) != triangles(b))
+      refuse(a, b, fmt::format("the triangles of sheet {}, {}, are others", i + 1, one));
   }
   if (left.frame_step_s() != right.frame_step_s()) {
     refuse(a, b,
@@ -50,16 +55,16 @@ void check_layouts(const RecordingReader& a, const RecordingReader& b) {
   }
 }
 
-struct Place {
-  std::string sheet;
-  GridPlace at;
-};
-
-Place place_of(const v1::StreamHeader& header, std::size_t particle) {
+// Says of what sheet the particle is, and where on it.
+void place(Comparison& found, const v1::StreamHeader& header, std::size_t particle) {
   for (const auto& sheet : header.sheets()) {
     const std::size_t index = particle - static_cast<std::size_t>(sheet.first_particle());
-    if (index < particle_count(sheet))
-      return {sheet.name(), place_in(sheet, static_cast<int>(index))};
+    if (index >= particle_count(sheet)) continue;
+    found.sheet = sheet.name();
+    found.particle = static_cast<int>(index);
+    found.place.reset();
+    if (is_grid(sheet)) found.place = place_in(sheet, found.particle);
+    return;
   }
   throw std::logic_error("no such particle");
 }
@@ -116,10 +121,7 @@ Comparison compare(RecordingReader& a, RecordingReader& b, const FrameRange& ran
       result.largest_m = found.largest;
       result.frame = number;
       result.time_s = left.time_s();
-      const Place place = place_of(a.header(), found.particle);
-      result.sheet = place.sheet;
-      result.row = place.at.row;
-      result.column = place.at.column;
+      place(result, a.header(), found.particle);
     }
     if (!result.first_unequal && left.SerializeAsString() != right.SerializeAsString())
       result.first_unequal = number;

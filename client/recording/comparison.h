@@ -7,6 +7,7 @@
 
 #include "client/recording/frame_range.h"
 #include "client/recording/reader.h"
+#include "client/sheet_layout.h"
 
 namespace weft::client {
 
@@ -21,9 +22,9 @@ struct Comparison {
   double largest_m = 0;  // infinite where one place is not finite
   std::int64_t frame = 0;
   double time_s = 0;
-  std::string sheet;  // the sheet and particle of the largest
-  int row = 0;
-  int column = 0;
+  std::string sheet;               // the sheet and particle of the largest
+  int particle = 0;                // counted from the sheet's first
+  std::optional<GridPlace> place;  // of a grid
 
   // First frame that is not the same to the bit: time, arrays and facts.
   std::optional<std::int64_t> first_unequal;

@@ -28,6 +28,11 @@ Inspection inspect(RecordingReader& recording,
   constexpr std::size_t kMostFaults = 1000;  // beyond this many the list says no more
   Inspection found;
   for (const auto& text : recording.find_damage()) found.faults.push_back({"file", text});
+  try {
+    recording.assets();
+  } catch (const Problem& problem) {
+    found.faults.push_back({"assets", problem.what()});
+  }
   double last_time = -std::numeric_limits<double>::infinity();
   for (auto number = recording.first_frame();
        number <= recording.last_frame() && found.faults.size() < kMostFaults; ++number) {

@@ -70,8 +70,10 @@ std::string as_doubles(const std::string& array, const v1::StreamHeader& header)
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double)};
 }
 
-bool is_whole(const std::string& array, const v1::FrameFormat& format, std::size_t particles) {
-  const std::size_t numbers = 3 * particles;
+// Three numbers of each particle, or triangle.
+bool is_whole(const std::string& array, const v1::FrameFormat& format, std::size_t count) {
+  const std::size_t numbers = 3 * count;
+  if (numbers == 0) return array.empty();
   switch (format.encoding()) {
     case v1::FRAME_ENCODING_FLOAT64:
       return array.size() == numbers * sizeof(double);
@@ -119,14 +121,20 @@ std::size_t particle_count(const v1::StreamHeader& header) {
   return static_cast<std::size_t>(particles);
 }
 
+std::size_t triangle_count(const v1::StreamHeader& header) {
+  std::size_t triangles = 0;
+  for (const auto& sheet : header.sheets()) triangles += triangle_count(sheet);
+  return triangles;
+}
+
 bool is_whole(const v1::Frame& frame, const v1::StreamHeader& header) {
   const std::size_t particles = particle_count(header);
-  const auto whole = [&](const std::string& array) {
-    return is_whole(array, header.format(), particles);
+  const auto whole = [&](const std::string& array, bool wanted, std::size_t count) {
+    return wanted ? is_whole(array, header.format(), count) : array.empty();
   };
-  return whole(frame.positions_m()) &&
-         (header.format().velocities() ? whole(frame.velocities_m_per_s())
-                                       : frame.velocities_m_per_s().empty());
+  return whole(frame.positions_m(), true, particles) &&
+         whole(frame.velocities_m_per_s(), header.format().velocities(), particles) &&
+         whole(frame.strain(), header.format().strain(), triangle_count(header));
 }
 
 Points read_points(const std::string& array, const v1::StreamHeader& header, std::size_t first,

@@ -16,6 +16,8 @@ struct Points {
 // Particles in the stream's frames. Throws where the header's sheets do not follow each other as
 // sheets do, or the format is unknown, or no frame has the number of the first.
 std::size_t particle_count(const v1::StreamHeader& header);
+// Triangles of all its sheets, which do follow each other so.
+std::size_t triangle_count(const v1::StreamHeader& header);
 
 // Whether the arrays of the frame can be read and hold all particles.
 bool is_whole(const v1::Frame& frame, const v1::StreamHeader& header);

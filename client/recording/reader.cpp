@@ -21,7 +21,8 @@ RecordingReader::RecordingReader(const std::string& path)
     : path_(path), database_(path, Database::Access::kRead) {
   if (pragma(database_, "application_id") != kRecordingId)
     throw malformed(path, "not a recording of weft");
-  if (pragma(database_, "user_version") != kRecordingVersion)
+  const std::int64_t version = pragma(database_, "user_version");
+  if (version != kGridsVersion && version != kTrianglesVersion)
     throw malformed(path, "made by another version of weft");
 
   Statement row =
@@ -44,7 +45,28 @@ RecordingReader::RecordingReader(const std::string& path)
   } catch (const Problem& problem) {
     throw damaged(path, problem.what());
   }
+  for (auto& sheet : *header_.mutable_sheets()) {  // older ones do not say it of grids
+    sheet.set_particle_count(static_cast<std::int32_t>(particle_count(sheet)));
+    sheet.set_triangle_count(static_cast<std::int32_t>(triangle_count(sheet)));
+  }
+  read_topology(version);
+}
+
+void RecordingReader::read_topology(std::int64_t version) {
   topology_.resize(static_cast<std::size_t>(header_.sheets_size()));
+  for (std::size_t sheet = 0; version == kTrianglesVersion && sheet < topology_.size(); ++sheet) {
+    const auto number = static_cast<std::int64_t>(sheet);
+    Statement row = database_.prepare("SELECT mesh, checksum FROM topology WHERE sheet = ?");
+    const bool there = row.bind(1, number).step();
+    const std::string mesh = there ? row.bytes(0) : std::string();
+    if (!there || row.integer(1) != checksum_of_frame(header_.uid(), number, mesh) ||
+        !topology_[sheet].ParseFromString(mesh)) {
+      throw damaged(path_, fmt::format("the checksum of the triangles of sheet {} is wrong",
+                                       header_.sheets(static_cast<int>(sheet)).name()));
+    }
+  }
+  if (!is_sound(topology_, header_))
+    throw damaged(path_, "the triangles of its sheets are not those that its header names");
 }
 
 std::int64_t RecordingReader::count_frames() {
@@ -83,6 +105,20 @@ std::vector<std::pair<std::int64_t, double>> RecordingReader::find_around(double
     if (row.bind(1, time_s).step()) found.emplace_back(row.integer(0), row.real(1));
   }
   return found;
+}
+
+Assets RecordingReader::assets() {
+  Assets assets;
+  if (!needs_topology(header_)) return assets;
+  Statement row = database_.prepare("SELECT name, data FROM assets");
+  while (row.step()) {
+    const std::string data = row.bytes(1);
+    const std::string name = asset_name(data);
+    if (row.bytes(0) != name)
+      throw damaged(path_, fmt::format("{} is not what its name says", row.bytes(0)));
+    assets.emplace(name, data);
+  }
+  return assets;
 }
 
 std::vector<std::string> RecordingReader::find_damage() {

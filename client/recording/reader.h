@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "client/assets.h"
 #include "client/recording/database.h"
 #include "client/sheet_layout.h"
 #include "weft/v1/frame.pb.h"
@@ -34,10 +35,14 @@ class RecordingReader {
   v1::Frame read(std::int64_t number);
   // The two frames around a time, (number, time); one at either end.
   std::vector<std::pair<std::int64_t, double>> find_around(double time_s);
+  // Those that the scene names, as far as the file has them.
+  Assets assets();
   // What is wrong with the file itself, if anything.
   std::vector<std::string> find_damage();
 
  private:
+  void read_topology(std::int64_t version);
+
   std::string path_;
   Database database_;
   v1::Scene scene_;

@@ -1,5 +1,6 @@
 #include "client/recording/recorder.h"
 
+#include "client/assets.h"
 #include "client/frame_feed.h"
 #include "client/recording/writer.h"
 
@@ -17,6 +18,7 @@ v1::StreamFramesRequest stream_request(const v1::Session& session, const Recordi
   request.mutable_format()->set_encoding(order.encoding);
   request.mutable_format()->set_velocities(order.velocities);
   request.mutable_format()->set_stats(true);
+  request.mutable_format()->set_topology(needs_topology(session.scene()));
   request.set_slow_reader(v1::SLOW_READER_HOLD_SESSION);
   return request;
 }
@@ -43,6 +45,7 @@ RecordingResult record(Connection& connection, const RecordingOrder& order,
                        const std::function<void(const Tally&)>& progress) {
   const v1::Session session = connection.get_session(order.session);
   FrameFeed feed(connection, stream_request(session, order), order.patience);
+  const Assets assets = assets_of(connection, session.scene());
   std::optional<RecordingWriter> writer;
   RecordingResult result;
 
@@ -51,7 +54,8 @@ RecordingResult record(Connection& connection, const RecordingOrder& order,
     if (!message) break;
     switch (message->message_case()) {
       case v1::StreamFramesResponse::kHeader:
-        writer.emplace(order.path, order.replace, session.scene(), message->header());
+        writer.emplace(order.path, order.replace, session.scene(), message->header(),
+                       feed.topology(), assets);
         if (order.run) let_run(connection, order);
         break;
       case v1::StreamFramesResponse::kFrame:
@@ -64,7 +68,8 @@ RecordingResult record(Connection& connection, const RecordingOrder& order,
         result.complete = !order.to && !order.until_rest && !order.through_pauses &&
                           has_ended(message->progress(), result.tally);
         break;
-      case v1::StreamFramesResponse::kRepair:  // counted with its frame
+      case v1::StreamFramesResponse::kTopology:  // the feed has it
+      case v1::StreamFramesResponse::kRepair:    // counted with its frame
       case v1::StreamFramesResponse::MESSAGE_NOT_SET:
         break;
     }

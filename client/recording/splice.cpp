@@ -24,6 +24,16 @@ void check_alike(const RecordingReader& a, const RecordingReader& b) {
   header.set_start_frame(a.header().start_frame());
   if (header.SerializeAsString() != a.header().SerializeAsString())
     fail("differ in what their frames hold");
+  for (std::size_t sheet = 0; sheet < a.topology().size(); ++sheet)
+    if (a.topology()[sheet].SerializeAsString() != b.topology()[sheet].SerializeAsString())
+      fail("differ in the triangles of their sheets");
+}
+
+// Of all: a recorder may not have had them.
+Assets assets_of(std::vector<RecordingReader>& recordings) {
+  Assets assets;
+  for (RecordingReader& recording : recordings) assets.merge(recording.assets());
+  return assets;
 }
 
 // The recordings by their first frames, all of the range in them; narrows the range to what there
@@ -79,7 +89,8 @@ FrameRange splice(std::vector<RecordingReader>& recordings, const SpliceOrder& o
   header.set_start_frame(range.first);
   const std::string unfinished = order.path + ".part";
   try {
-    RecordingWriter writer(unfinished, true, recordings.front().scene(), header);
+    RecordingWriter writer(unfinished, true, recordings.front().scene(), header,
+                           recordings.front().topology(), assets_of(recordings));
     for (std::int64_t number = range.first; number <= range.last; ++number) {
       progress(number);
       writer.add(read(recordings, number));

@@ -26,12 +26,34 @@ Database create(const std::string& path, bool replace) {
   return database;
 }
 
-void describe(Database& database, const v1::Scene& scene, const v1::StreamHeader& header) {
+void write_triangles(Database& database, const std::string& uid, const Topology& topology,
+                     const Assets& assets) {
+  database.execute(kTriangleTables);
+  for (std::size_t sheet = 0; sheet < topology.size(); ++sheet) {
+    const std::string mesh = topology[sheet].SerializeAsString();
+    const auto number = static_cast<std::int64_t>(sheet);
+    database.prepare("INSERT INTO topology VALUES (?, ?, ?)")
+        .bind(1, number)
+        .bind_bytes(2, mesh)
+        .bind(3, checksum_of_frame(uid, number, mesh))
+        .step();
+  }
+  for (const auto& [name, data] : assets) {
+    database.prepare("INSERT INTO assets VALUES (?, ?)")
+        .bind_text(1, name)
+        .bind_bytes(2, data)
+        .step();
+  }
+}
+
+void describe(Database& database, const v1::Scene& scene, const v1::StreamHeader& header,
+              const Topology& topology, const Assets& assets) {
   const std::string scene_json = to_json(scene, Defaults::kLeftOut).dump();
   const std::string header_json = to_json(header, Defaults::kLeftOut).dump();
-  database.execute(fmt::format("BEGIN; PRAGMA application_id = {}; PRAGMA user_version = {}; {}",
-                               kRecordingId, kRecordingVersion, kRecordingTables)
-                       .c_str());
+  database.execute(
+      fmt::format("BEGIN; PRAGMA application_id = {}; PRAGMA user_version = {}; {}", kRecordingId,
+                  needs_topology(header) ? kTrianglesVersion : kGridsVersion, kRecordingTables)
+          .c_str());
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
   const std::string recorded_at = fmt::format("{:%FT%TZ}", fmt::gmtime(now));
   database.prepare("INSERT INTO recording VALUES (?, ?, ?, ?, ?)")
@@ -46,17 +68,19 @@ void describe(Database& database, const v1::Scene& scene, const v1::StreamHeader
       .bind(1, none)
       .bind(2, checksum_of_frame(header.uid(), none))
       .step();
+  if (needs_topology(header)) write_triangles(database, header.uid(), topology, assets);
   database.execute("COMMIT");
 }
 
 }  // namespace
 
 RecordingWriter::RecordingWriter(const std::string& path, bool replace, const v1::Scene& scene,
-                                 const v1::StreamHeader& header)
+                                 const v1::StreamHeader& header, const Topology& topology,
+                                 const Assets& assets)
     : uid_(header.uid()),
       last_frame_(header.start_frame() - 1),
       database_(create(path, replace)),
-      insert_((describe(database_, scene, header),
+      insert_((describe(database_, scene, header, topology, assets),
                database_.prepare("INSERT INTO frames VALUES (?, ?, ?, ?)"))),
       extend_(database_.prepare("UPDATE extent SET last_frame = ?, checksum = ?")),
       last_commit_(Clock::now()) {}

@@ -3,7 +3,9 @@
 #include <chrono>
 #include <string>
 
+#include "client/assets.h"
 #include "client/recording/database.h"
+#include "client/sheet_layout.h"
 #include "weft/v1/frame.pb.h"
 #include "weft/v1/scene.pb.h"
 
@@ -12,9 +14,11 @@ namespace weft::client {
 // Writes a recording. What is committed stays readable, whatever becomes of this process.
 class RecordingWriter {
  public:
-  // Throws where the file exists, unless it is to be replaced.
+  // Throws where the file exists, unless it is to be replaced. Where there are sheets of triangles
+  // their topology is kept, and the assets; else neither.
   RecordingWriter(const std::string& path, bool replace, const v1::Scene& scene,
-                  const v1::StreamHeader& header);
+                  const v1::StreamHeader& header, const Topology& topology = {},
+                  const Assets& assets = {});
   // Commits what it can.
   ~RecordingWriter();
   RecordingWriter(const RecordingWriter&) = delete;

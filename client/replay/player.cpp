@@ -61,6 +61,11 @@ std::shared_ptr<const Frame> Player::frame(std::int64_t number) {
   return number == place_.newest->number ? place_.newest : load(number);
 }
 
+Assets Player::assets() {
+  std::lock_guard lock(mutex_);
+  return recording_.assets();
+}
+
 Player::Place Player::run(const Run& run) {
   std::lock_guard lock(mutex_);
   if (place_.state != v1::SESSION_STATE_FAILED && place_.newest->number < last_frame()) {

@@ -39,6 +39,7 @@ class Player {
 
   const v1::Scene& scene() const { return recording_.scene(); }
   const v1::StreamHeader& header() const { return recording_.header(); }
+  const Topology& topology() const { return recording_.topology(); }
   const std::string& recorded_at() const { return recording_.recorded_at(); }
   std::int64_t first_frame() const { return recording_.first_frame(); }
   std::int64_t last_frame() const { return recording_.last_frame(); }
@@ -47,6 +48,8 @@ class Player {
   // The same, as soon as frame `next` has come, or more has changed than `changes`, or it is
   // closed, or the time is over.
   Place wait(std::int64_t next, std::uint64_t changes, std::chrono::milliseconds longest) const;
+  // Those that the scene names, as far as they were recorded.
+  Assets assets();
   // A frame that has come. Throws where it cannot be read.
   std::shared_ptr<const Frame> frame(std::int64_t number);
 

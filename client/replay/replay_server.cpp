@@ -13,11 +13,15 @@
 
 #include "client/problem.h"
 #include "client/replay/player.h"
+#include "client/sheet_layout.h"
+#include "server/rpc/bytes.h"
 #include "server/rpc/checks.h"
 #include "server/rpc/errors.h"
 #include "server/rpc/frame_encoding.h"
 #include "server/rpc/textile_service.h"
+#include "server/rpc/topology.h"
 #include "server/session/limits.h"
+#include "weft/v1/asset.grpc.pb.h"
 #include "weft/v1/frame.grpc.pb.h"
 #include "weft/v1/server.grpc.pb.h"
 #include "weft/v1/session.grpc.pb.h"
@@ -31,12 +35,39 @@ using std::chrono::milliseconds;
 constexpr milliseconds kLook{200};           // for calls that were cancelled
 constexpr milliseconds kProgressDue{1'750};  // with kLook within two seconds
 
+// As far as frames need it: of triangles without their start.
+SheetShape shape_of(const SheetMesh& sheet, const v1::Sheet& recorded) {
+  const v1::SheetLayout& layout = sheet.layout;
+  if (is_grid(layout)) {
+    return Grid{
+        .rows = layout.rows(), .columns = layout.columns(), .spacing = recorded.grid().spacing_m()};
+  }
+  TriangleMesh mesh;
+  mesh.triangles = sheet.triangles;
+  mesh.start.resize(particle_count(layout), Vector3d::Zero());
+  for (const auto& [u, v] : sheet.flat) mesh.flat.emplace_back(u, v);
+  mesh.flat_triangles = sheet.flat_triangles;
+  for (const PanelRun& panel : sheet.panels)
+    mesh.panels.push_back({panel.name, static_cast<int>(panel.count), panel.grain_rad});
+  return complete(std::move(mesh));
+}
+
+std::vector<SheetShape> shapes_of(const Player& player) {
+  std::vector<SheetShape> shapes;
+  for (const SheetMesh& sheet : meshes_of(player.header(), player.topology())) {
+    const auto index = static_cast<int>(shapes.size());
+    const bool known = index < player.scene().sheets_size();
+    shapes.push_back(shape_of(sheet, known ? player.scene().sheets(index) : v1::Sheet()));
+  }
+  return shapes;
+}
+
 }  // namespace
 
 // What all services know.
 class Replay {
  public:
-  explicit Replay(const std::string& path) : player(path), path_(path) {}
+  explicit Replay(const std::string& path) : player(path), shapes(shapes_of(player)), path_(path) {}
 
   Status find(const std::string& name) const {
     return name == player.header().session() ? Status::OK : errors::session_not_found(name);
@@ -70,6 +101,7 @@ class Replay {
   }
 
   Player player;
+  const std::vector<SheetShape> shapes;
 
  private:
   std::string path_;
@@ -196,6 +228,35 @@ class ServerReplay final : public v1::ServerService::Service {
   Replay& replay_;
 };
 
+// Only what a recorder asks for.
+class AssetReplay final : public v1::AssetService::Service {
+ public:
+  explicit AssetReplay(Replay& replay) : replay_(replay) {}
+
+  Status DownloadAsset(ServerContext*, const v1::DownloadAssetRequest* request,
+                       grpc::ServerWriter<v1::DownloadAssetResponse>* writer) override try {
+    constexpr std::size_t kPiece = 1 << 20;
+    const Assets assets = replay_.player.assets();
+    const auto asset = assets.find(request->name());
+    if (asset == assets.end()) return errors::asset_not_found(request->name());
+    const std::string& bytes = asset->second;
+    if (request->offset() < 0 || static_cast<std::size_t>(request->offset()) > bytes.size())
+      return errors::field_invalid(
+          "offset", fmt::format("{} is not within 0 to {}", request->offset(), bytes.size()));
+    v1::DownloadAssetResponse message;
+    for (auto at = static_cast<std::size_t>(request->offset()); at < bytes.size(); at += kPiece) {
+      message.set_data(bytes.substr(at, kPiece));
+      writer->Write(message);
+    }
+    return Status::OK;
+  } catch (const Problem& problem) {
+    return {grpc::StatusCode::DATA_LOSS, problem.what()};
+  }
+
+ private:
+  Replay& replay_;
+};
+
 class FrameReplay final : public v1::FrameService::Service {
  public:
   explicit FrameReplay(Replay& replay) : replay_(replay), player_(replay.player) {}
@@ -255,12 +316,16 @@ class FrameReplay final : public v1::FrameService::Service {
         : frames_(frames),
           context_(context),
           writer_(writer),
-          order_{.format = header.format(), .most_bytes = Limits().max_frame_bytes} {
-      for (const auto& sheet : header.sheets())
-        order_.sheets.emplace_back(Grid{.rows = sheet.rows(), .columns = sheet.columns()});
+          order_{.format = header.format(),
+                 .sheets = frames.replay_.shapes,
+                 .most_bytes = Limits().max_frame_bytes} {
       Response message;
       *message.mutable_header() = header;
       write(message);
+      if (order_.format.topology()) {
+        for (const auto& part : encoded_topology(order_.sheets, order_.most_bytes))
+          if (decode(part, message)) write(message);
+      }
       changes_ = frames_.player_.place().changes;
     }
 
@@ -346,6 +411,7 @@ struct ReplayServer::Parts {
   SessionReplay sessions{replay};
   FrameReplay frames{replay};
   ServerReplay servers{replay};
+  AssetReplay assets{replay};
   Access access{{}, false};
   TextileService textiles{access};
   std::unique_ptr<grpc::Server> grpc;
@@ -361,6 +427,7 @@ ReplayServer::ReplayServer(const std::string& path, const std::string& address, 
   builder.RegisterService(&parts_->sessions);
   builder.RegisterService(&parts_->frames);
   builder.RegisterService(&parts_->servers);
+  builder.RegisterService(&parts_->assets);
   builder.RegisterService(&parts_->textiles);
   parts_->grpc = builder.BuildAndStart();
   if (!parts_->grpc || port == 0) {

@@ -14,6 +14,7 @@ Observer::Observer(Connection& connection, const v1::Session& session,
   request.set_start_frame(session.frame());
   *request.mutable_format() = format;
   request.mutable_format()->set_stats(true);
+  request.mutable_format()->set_topology(needs_topology(session.scene()));
   request.set_slow_reader(v1::SLOW_READER_HOLD_SESSION);
   thread_ = std::thread([this, request] { observe(request); });
 }
@@ -33,11 +34,12 @@ Sight Observer::await(const std::function<bool(const Sight&)>& holds) {
 
 void Observer::record(const std::string& path, bool replace, const v1::Scene& scene) {
   await([](const Sight& sight) { return sight.tally.frames > 0; });
+  const Assets assets = assets_of(connection_, scene);
   const std::lock_guard lock(mutex_);
   writer_.reset();
   v1::StreamHeader header = sight_.header;
   header.set_start_frame(sight_.frame.number());
-  writer_.emplace(path, replace, scene, header);
+  writer_.emplace(path, replace, scene, header, sight_.topology, assets);
   writer_->add(sight_.frame);
 }
 
@@ -53,7 +55,7 @@ void Observer::observe(v1::StreamFramesRequest request) {
     while (const auto message = feed.next()) {
       {
         const std::lock_guard lock(mutex_);
-        take(*message);
+        take(*message, feed.topology());
       }
       changed_.notify_all();
     }
@@ -67,8 +69,11 @@ void Observer::observe(v1::StreamFramesRequest request) {
   changed_.notify_all();
 }
 
-void Observer::take(const v1::StreamFramesResponse& message) {
-  if (message.has_header()) sight_.header = message.header();
+void Observer::take(const v1::StreamFramesResponse& message, const Topology& topology) {
+  if (message.has_header()) {
+    sight_.header = message.header();
+    sight_.topology = topology;
+  }
   if (message.has_progress()) {
     sight_.progress = message.progress();
     if (writer_) writer_->commit();

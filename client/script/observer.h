@@ -18,6 +18,7 @@ namespace weft::client {
 // What was seen of a session so far.
 struct Sight {
   v1::StreamHeader header;
+  Topology topology;
   v1::Frame frame;  // the newest
   Tally tally;
   std::optional<double> rest_time_s;  // of the first frame of the rest that the newest is in
@@ -43,7 +44,7 @@ class Observer {
 
  private:
   void observe(v1::StreamFramesRequest request);
-  void take(const v1::StreamFramesResponse& message);
+  void take(const v1::StreamFramesResponse& message, const Topology& topology);
 
   Connection& connection_;
   std::stop_source stop_;

@@ -75,12 +75,21 @@ WebMessage message_of(const v1::InteractResponse& response) {
   return {.bytes = to_json(response).dump()};
 }
 
-// False where the rest of a frame is still to come.
-bool is_whole(const v1::InteractResponse& /*response*/, FrameParts& /*parts*/) { return true; }
+struct Parts {
+  FrameParts frames;
+  TopologyParts topology;
+};
 
-bool is_whole(v1::ViewFramesResponse& response, FrameParts& parts) {
-  if (response.has_header()) parts.begin(response.header());
-  return !response.has_frame() || parts.join(*response.mutable_frame());
+// False where the rest of a frame, or of a sheet's triangles, is still to come.
+bool is_whole(const v1::InteractResponse& /*response*/, Parts& /*parts*/) { return true; }
+
+bool is_whole(v1::ViewFramesResponse& response, Parts& parts) {
+  if (response.has_header()) {
+    parts.frames.begin(response.header());
+    parts.topology.begin(response.header());
+  }
+  if (response.has_topology()) return parts.topology.join(*response.mutable_topology());
+  return !response.has_frame() || parts.frames.join(*response.mutable_frame());
 }
 
 WebMessage message_of(v1::ViewFramesResponse response) {
@@ -149,7 +158,7 @@ class Stream : public Conversation {
   std::unique_ptr<grpc::ClientContext> context_;
   std::optional<std::stop_callback<std::function<void()>>> cancel_;
   std::unique_ptr<Reader> stream_;
-  FrameParts parts_;
+  Parts parts_;
 };
 
 // ---- answers

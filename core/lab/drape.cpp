@@ -156,7 +156,7 @@ double look(const Specimen& disc, const Matrix3Xd& rest, LabReport& report) {
   constexpr int kAngles = 360;
   const Shadow shadow(disc.mesh, rest), flat(disc.mesh, disc.start);
   const double held = std::numbers::pi * kHeldRadius * kHeldRadius;
-  LabCurve outline{join(1000 * disc.sheet.spacing(), " mm"), {"x m", "z m"}, {}};
+  LabCurve outline{join(1000 * disc.spacing, " mm"), {"x m", "z m"}, {}};
   std::vector<double> radii;
   for (int k = 0; k <= kAngles; ++k) {
     const double angle = 2 * std::numbers::pi * k / kAngles, radius = shadow.radius(angle);
@@ -174,9 +174,11 @@ double look(const Specimen& disc, const Matrix3Xd& rest, LabReport& report) {
 double hang(const LabOrder& order, double spacing, const std::stop_token& stop, LabReport& report) {
   const MeasuredTextile textile = along_warp(order);
   const bool isometric = std::holds_alternative<Isometric>(order.bending);
-  Specimen disc = cut_disc(textile, order.bending, kRadius, kHeldRadius, spacing);
+  Specimen disc = order.mesh
+                      ? cut_disc(textile, order.bending, *order.mesh, kRadius, kHeldRadius, spacing)
+                      : cut_disc(textile, order.bending, kRadius, kHeldRadius, spacing);
   // no direction is preferred where it begins to fold
-  for (int i = 0; i < disc.columns(); ++i) {
+  for (Eigen::Index i = 0; i < disc.held.size(); ++i) {
     const double r = std::hypot(disc.start(0, i), disc.start(2, i));
     const double angle = std::atan2(disc.start(2, i), disc.start(0, i));
     double ripple = 0;
@@ -227,6 +229,7 @@ Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, dou
   Eigen::ArrayXi place = Eigen::ArrayXi::Constant(side * side, -1);
   const int count = there.sum();
   disc.sheet.shape = Grid{1, count, spacing};
+  disc.spacing = spacing;
   disc.start.resize(3, count);
   disc.held.resize(count);
   disc.mesh.mass.resize(count);
@@ -257,6 +260,14 @@ Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, dou
       disc.mesh.triangles.push_back({place[d], place[c], place[b]});
     }
   }
+  return disc;
+}
+
+Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, Cut mesh,
+                  double radius, double held_radius, double spacing) {
+  Specimen disc = cut(textile, bending, cut_disc(mesh, radius, spacing), spacing);
+  for (Eigen::Index i = 0; i < disc.held.size(); ++i)
+    disc.held[i] = disc.start.col(i).norm() <= held_radius + spacing / 4 ? 1 : 0;
   return disc;
 }
 

@@ -10,6 +10,10 @@ namespace weft {
 Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, double radius,
                   double held_radius, double spacing);
 
+// The same of triangles, with a round outline.
+Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, Cut mesh,
+                  double radius, double held_radius, double spacing);
+
 // What a disc of a given spacing has at most, with all around it.
 double drape_particles(double spacing);
 

@@ -6,7 +6,9 @@
 #include <optional>
 #include <variant>
 
+#include "core/forces/curvature.h"
 #include "core/forces/elastic.h"
+#include "core/forces/membrane.h"
 
 namespace weft {
 namespace {
@@ -24,8 +26,7 @@ class Statics {
   int unknowns() const { return 3 * free_; }
 
   double energy(const Matrix3Xd& x) const {
-    return elastic_energy(mesh_, x) -
-           mesh_.mass.dot(x.transpose() * gravity_);
+    return elastic_energy(mesh_, x) - mesh_.mass.dot(x.transpose() * gravity_);
   }
 
   // Net forces on the free particles.
@@ -52,7 +53,9 @@ class Statics {
       for (std::size_t a = 0; a < 4; ++a)
         for (std::size_t b = 0; b < 4; ++b)
           add(stencil.particle[a], stencil.particle[b],
-              stencil.stiffness * stencil.weight[a] * stencil.weight[b] * Matrix3d::Identity());
+              stencil.stiffness * stencil.weight[a] * stencil.weight[b]);
+    for (const MembraneElement& element : mesh_.surface.membrane) add_element(element, x);
+    for (const CurvatureFit& fit : mesh_.surface.fits) add_fit(fit);
     for (int i = 0; i < unknowns(); ++i) entries_.emplace_back(i, i, 0.0);
     Sparse matrix(unknowns(), unknowns());
     matrix.setFromTriplets(entries_.begin(), entries_.end());
@@ -66,6 +69,13 @@ class Statics {
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
         if (row + a >= column + b) entries_.emplace_back(row + a, column + b, block(a, b));
+  }
+
+  // alike in every direction
+  void add(int i, int j, double along_each) {
+    const int row = place_[i], column = place_[j];
+    if (column < 0 || row < column) return;
+    for (int a = 0; a < 3; ++a) entries_.emplace_back(row + a, column + a, along_each);
   }
 
   void add_connection(const Family& family, int i, int j, const Matrix3Xd& x) {
@@ -89,6 +99,43 @@ class Statics {
     add(j, j, block);
     add(i, j, -block);
     add(j, i, -block);
+  }
+
+  // sum of c_pq grad e_p grad e_q^T over the strains, and s_p times their second derivatives
+  void add_element(const MembraneElement& element, const Matrix3Xd& x) {
+    const Threads thread = threads_of(element, x);
+    const MembraneStrain e = strain_of(thread);
+    const MembraneStiffness& c = mesh_.surface.stretch[static_cast<std::size_t>(element.panel)];
+    const MembraneStrain s = stress(c, e, mesh_.surface.pushes);
+    const bool warp_slack = !mesh_.surface.pushes && s.warp == 0;
+    const bool weft_slack = !mesh_.surface.pushes && s.weft == 0;
+    Matrix3d law;
+    law << (warp_slack ? 0 : c.warp), c.coupling, 0, c.coupling, (weft_slack ? 0 : c.weft), 0, 0, 0,
+        c.shear;
+    std::array<Matrix3d, 3> gradient;  // columns: of the strains warp, weft and shear, 1/m
+    for (std::size_t a = 0; a < 3; ++a)
+      gradient[a] << element.du[a] * thread.warp, element.dv[a] * thread.weft,
+          element.du[a] * thread.weft + element.dv[a] * thread.warp;
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t b = 0; b < 3; ++b) {
+        const double geometric =
+            s.warp * element.du[a] * element.du[b] + s.weft * element.dv[a] * element.dv[b] +
+            s.shear * (element.du[a] * element.dv[b] + element.dv[a] * element.du[b]);
+        const Matrix3d block =
+            gradient[a] * law * gradient[b].transpose() + geometric * Matrix3d::Identity();
+        add(element.particle[a], element.particle[b], element.area * block);
+      }
+    }
+  }
+
+  void add_fit(const CurvatureFit& fit) {
+    const Vector3d stiffness = fit_stiffness(mesh_.surface, fit);
+    for (std::size_t a = 0; a < fit.particle.size(); ++a) {
+      const Vector3d row = stiffness.cwiseProduct(Eigen::Map<const Vector3d>(fit.weight[a].data()));
+      for (std::size_t b = 0; b < fit.particle.size(); ++b)
+        add(fit.particle[a], fit.particle[b],
+            row.dot(Eigen::Map<const Vector3d>(fit.weight[b].data())));
+    }
   }
 
   const Mesh& mesh_;

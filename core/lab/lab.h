@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/model/scene.h"
+#include "core/triangles/cut.h"
 
 namespace weft {
 
@@ -14,7 +15,8 @@ namespace weft {
 enum class LabTest {
   kTensile,     // a strip pulled by 1 %: its modulus
   kShear,       // a frame sheared by 1 degree: its modulus
-  kBending,     // the bending curve of a connection: f_b, f_b*, the evaluator's, and its error
+  kBending,     // the bending curve of a connection: f_b, f_b*, the evaluator's, and its error;
+                // on triangles the rigidity of a cylinder in four directions
   kCantilever,  // ASTM D1388: a strip over an edge hangs at 41.5 degrees
   kChain,       // threads without bending between two hooks: an elastic catenary
   kDrape,       // ISO 9073-9 (Cusick): a disc hangs over a smaller one, its shadow is measured
@@ -26,6 +28,7 @@ struct LabOrder {
   BendingLaw bending;
   bool weft = false;             // the specimen is cut along the weft
   std::vector<double> spacings;  // h, m; empty: a range that the test chooses
+  std::optional<Cut> mesh = {};  // of the specimen's triangles; absent: a lattice
 };
 
 // A figure that was asked for and what the model made of it, at one resolution.

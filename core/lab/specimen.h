@@ -14,7 +14,11 @@ struct Specimen {
   Mesh mesh;
   Matrix3Xd start;      // (3 x particles) m
   Eigen::ArrayXi held;  // (particles) 1 keeps its place
+  double spacing = 0;   // m
 
+  void hold_at(double x);  // what starts there, m
+
+  // of a lattice
   int rows() const { return grid_of(sheet).rows; }
   int columns() const { return grid_of(sheet).columns; }
   int at(int row, int column) const { return row * columns() + column; }
@@ -24,6 +28,13 @@ struct Specimen {
 // A rectangle, of which nothing is held.
 Specimen cut(const MeasuredTextile& textile, const BendingLaw& bending, int rows, int columns,
              double spacing);
+
+// A piece of triangles, u along x and v along z, of which nothing is held.
+Specimen cut(const MeasuredTextile& textile, const BendingLaw& bending, const RestShape& shape,
+             double spacing);
+
+// A rectangle of whole spacings on the mesh of an order, along x and z.
+Specimen cut_rectangle(const LabOrder& order, double length, double width, double spacing);
 
 // The textile of an order; one whose specimen is cut along the weft is turned.
 MeasuredTextile along_warp(const LabOrder& order);

@@ -26,10 +26,7 @@ class LatticeSolver : public SheetSolver {
         state_(law_.layout, compensated),
         gap_(static_cast<std::size_t>(law_.layout.rows)) {
     law_.compensated = compensated;
-    if (!wind) return;
-    law_.wind.blows = true;
-    law_.wind.pressure = static_cast<T>(wind->air_density / 12);
-    law_.wind.drag = static_cast<T>(wind->tangential_drag / 6);
+    if (wind) law_.wind = make_wind_law<T>(*wind);
   }
 
   void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {

@@ -1,40 +1,10 @@
 #include "core/lattice/state.h"
 
-#include <sys/mman.h>
-
 #include <algorithm>
-#include <cstdlib>
-#include <cstring>
 #include <new>
 #include <utility>
 
 namespace weft {
-namespace {
-
-// Large ones on large pages: sheets that fit no cache are stepped some 8 % faster.
-void* allocate(std::size_t bytes) {
-  constexpr std::size_t kVector = 64, kPage = 2 << 20;
-  const std::size_t unit = bytes < 2 * kPage ? kVector : kPage;
-  const std::size_t size = (bytes + unit - 1) / unit * unit;
-  void* const data = std::aligned_alloc(unit, size);
-  if (data == nullptr) throw std::bad_alloc();
-  if (unit == kPage) madvise(data, size, MADV_HUGEPAGE);  // slower where it is refused
-  return data;
-}
-
-}  // namespace
-
-template <class T>
-AlignedArray<T>::AlignedArray(std::size_t size)
-    : data_(static_cast<T*>(allocate(size * sizeof(T)))), size_(size) {
-  std::memset(data_.get(), 0, size * sizeof(T));
-}
-
-template <class T>
-void AlignedArray<T>::Free::operator()(T* data) const {
-  std::free(data);
-}
-
 template <class T>
 SweepState<T>::SweepState(const LatticeLayout<T>& layout, bool compensated)
     : layout_(layout),
@@ -91,8 +61,6 @@ std::vector<SweepBand<T>>& SweepState<T>::divide(int bands) {
   return bands_;
 }
 
-template class AlignedArray<float>;
-template class AlignedArray<double>;
 template class SweepState<float>;
 template class SweepState<double>;
 

@@ -1,28 +1,11 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <vector>
 
+#include "core/motion/aligned_array.h"
+
 namespace weft {
-
-// Zeroed values on a vector boundary.
-template <class T>
-class AlignedArray {
- public:
-  AlignedArray() = default;
-  explicit AlignedArray(std::size_t size);
-  T* data() { return data_.get(); }
-  const T* data() const { return data_.get(); }
-  std::size_t size() const { return size_; }
-
- private:
-  struct Free {
-    void operator()(T* data) const;
-  };
-  std::unique_ptr<T[], Free> data_;
-  std::size_t size_ = 0;
-};
 
 // How a row of a lattice lies in vectors: it is cut into as many runs of columns as a vector has
 // lanes, and vector j holds column j of every run. The neighbours of a whole vector are then whole

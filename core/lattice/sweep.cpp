@@ -9,6 +9,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "core/forces/wind-inl.h"
 #include "core/lattice/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -417,9 +418,10 @@ class Sweep {
                                    product(minus(right, opposite), minus(below, opposite))};
     const Each<V, 2> area2{squared(cross[0]), squared(cross[1])};
     const Each<V, 2> inverse = inverse_sqrt(d, area2);
-    Triple<V> upper = blow(cross[0], area2[0], inverse[0], plus(slow, load(shared1 + kW)));
+    const WindLaw<T>& wind = law_.wind;
+    Triple<V> upper = blow(d, wind, cross[0], area2[0], inverse[0], plus(slow, load(shared1 + kW)));
     Triple<V> lower =
-        blow(cross[1], area2[1], inverse[1], plus(slow, load(shared2 + kShared + kW)));
+        blow(d, wind, cross[1], area2[1], inverse[1], plus(slow, load(shared2 + kShared + kW)));
     if constexpr (kBorder) {
       upper = only(upper, column(p, kRight1));
       lower = only(lower, column(p, kRight1));
@@ -430,21 +432,6 @@ class Sweep {
     T *const next1 = p.force1 + kForces, *const after1 = p.force2 + kForces;
     store(plus(load(next1), both), next1);
     store(plus(load(after1), lower), after1);
-  }
-
-  // On each corner of a triangle, N. cross: along its normal, twice its area long.
-  HWY_INLINE Triple<V> blow(const Triple<V>& cross, V square, V inverse,
-                            const Triple<V>& three_w) const {
-    const D d;
-    const WindLaw<T>& wind = law_.wind;
-    const Triple<V> air{hn::Set(d, wind.velocity[0]), hn::Set(d, wind.velocity[1]),
-                        hn::Set(d, wind.velocity[2])};
-    const Triple<V> relative = minus_times(air, three_w, hn::Set(d, wind.to_velocity));
-    const V along = hn::Mul(dot(relative, cross), inverse);
-    const V drag = hn::Set(d, wind.drag);
-    const V push = hn::Mul(
-        along, hn::NegMulAdd(hn::Abs(along), hn::Neg(hn::Set(d, wind.pressure)), hn::Neg(drag)));
-    return plus_times(times(cross, push), relative, hn::Mul(hn::Mul(square, inverse), drag));
   }
 
   static HWY_INLINE Triple<V> only(const Triple<V>& v, V mask) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "core/forces/wind_law.h"
 #include "core/lattice/state.h"
 #include "core/motion/thread_pool.h"
 
@@ -28,16 +29,6 @@ struct BendLaw {
   // f_b = intercept + slope l of each segment (N, N/m), 32 at least, or the polynomial's
   // coefficients, highest power first (N)
   AlignedArray<T> intercepts, slopes;
-};
-
-// Moving air, as it presses on the two triangles of every cell.
-template <class T>
-struct WindLaw {
-  bool blows = false;
-  std::array<T, 3> velocity{};  // of the air, m/s
-  T to_velocity = 0;            // 1 / (6 dt): what the sum of three w is multiplied by, 1/s
-  T pressure = 0;               // rho / 12, kg/m^3
-  T drag = 0;                   // c_t / 6, kg/(m^2 s)
 };
 
 enum class BendKind {

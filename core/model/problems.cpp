@@ -157,20 +157,20 @@ bool check_shape(const Triangles& mesh, const std::string& sheet, Check& check) 
   return sound;
 }
 
-// Triangles resist as measured; one constant for every connection says nothing of them.
+// One constant for every connection says nothing of a membrane, nor of two textiles.
 void check_triangles(const SheetDefinition& sheet, const std::string& field, Check& check) {
-  const auto needs_measured = [&](const Textile& textile, const std::string& path) {
-    check_textile(textile, path, check);
-    if (std::holds_alternative<RawTextile>(textile.model))
-      check.problem(path + ".raw", "is for grids only; triangles need measured values");
-  };
-  needs_measured(sheet.textile, field + ".textile");
+  check_textile(sheet.textile, field + ".textile", check);
+  const bool raw = std::holds_alternative<RawTextile>(sheet.textile.model);
+  if (raw && !std::holds_alternative<ChoiKo>(sheet.bending))
+    check.problem(field + ".textile.raw",
+                  "needs bending.choi_ko on triangles, or give measured values");
   for (const PanelTextile& each : sheet.panel_textiles) {
     const auto panel = static_cast<std::size_t>(each.panel);
-    needs_measured(each.textile, at(field + ".triangles.data.panels", panel) + ".textile");
+    const std::string path = at(field + ".triangles.data.panels", panel) + ".textile";
+    check_textile(each.textile, path, check);
+    if (raw || std::holds_alternative<RawTextile>(each.textile.model))
+      check.problem(path, "panels differ in measured values only; the sheet's are raw, or these");
   }
-  if (std::holds_alternative<ChoiKo>(sheet.bending))
-    check.problem(field + ".bending.choi_ko", "is for grids only; triangles bend by isometric");
 }
 
 void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& check) {

@@ -13,7 +13,8 @@ using Plane2 = std::complex<double>;
 
 struct Neighbour {
   int particle;
-  Plane2 offset;  // from the particle, m
+  Plane2 offset;    // from the particle, m
+  Plane2 turn = 1;  // of its frame against the particle's
 };
 
 // The triangles around a particle, laid flat beside each other in the frame of the first.
@@ -33,18 +34,34 @@ class Fans {
   const Fan& at(int i) const { return fans_[static_cast<std::size_t>(i)]; }
   const Corners& corners() const { return corners_; }
 
-  // With the neighbours of its neighbours.
-  std::vector<Neighbour> widened(int i) const {
-    const auto known = [&](const std::vector<Neighbour>& ring, int k) {
-      return std::any_of(ring.begin(), ring.end(),
-                         [&](const Neighbour& each) { return each.particle == k; });
-    };
-    std::vector<Neighbour> wide = at(i).ring;
-    for (const auto& [j, offset] : at(i).ring) {
-      const Plane2 turn = turn_between(i, j);
-      for (const auto& [k, further] : at(j).ring)
-        if (k != i && !known(wide, k)) wide.push_back({k, offset + turn * further});
+  std::vector<Neighbour> ring(int i) const {
+    std::vector<Neighbour> ring = at(i).ring;
+    for (Neighbour& each : ring) each.turn = turn_between(i, each.particle);
+    return ring;
+  }
+
+  // With those neighbours of its neighbours that at least so many of them have.
+  std::vector<Neighbour> widened(int i, int least) const {
+    const std::vector<Neighbour> near = ring(i);
+    std::vector<Neighbour> wide = near;
+    std::vector<int> times(near.size(), least);
+    for (const auto& [j, offset, turn] : near) {
+      for (const Neighbour& each : at(j).ring) {
+        const int k = each.particle;
+        if (k == i) continue;
+        std::size_t known = 0;
+        while (known < wide.size() && wide[known].particle != k) ++known;
+        if (known == wide.size()) {
+          wide.push_back({k, offset + turn * each.offset, turn * turn_between(j, k)});
+          times.push_back(0);
+        }
+        ++times[known];
+      }
     }
+    std::size_t kept = 0;
+    for (std::size_t n = 0; n < wide.size(); ++n)
+      if (times[n] >= least) wide[kept++] = wide[n];
+    wide.resize(kept);
     return wide;
   }
 
@@ -123,29 +140,173 @@ class Fans {
   std::vector<Fan> fans_;
 };
 
-// Rows uu, uv, vv: what neighbours weigh in the second derivatives of a quadratic through a
-// particle, 1/m^2.
-Eigen::Matrix3Xd quadratic(const std::vector<Neighbour>& near) {
+// (3 x 3) uu, uv and vv in a frame that is turned, by those in the one it is turned against.
+Eigen::Matrix3d into(Plane2 turn) {
+  const double c = turn.real(), s = turn.imag();
+  Eigen::Matrix3d turned;
+  turned << c * c, 2 * c * s, s * s, -c * s, c * c - s * s, c * s, s * s, -2 * c * s, c * c;
+  return turned;
+}
+
+// A quadratic through a particle, by least squares over those near it.
+struct Quadratic {
+  std::vector<Neighbour> near;
+  double area = 0;                                 // that belongs to the particle, m^2
+  Eigen::Matrix<double, 2, Eigen::Dynamic> slope;  // what each weighs in u and v, 1/m
+  Eigen::Matrix3Xd weights;                        // and in uu, uv, vv, 1/m^2
+  VectorXd importance;                             // of each, the square root
+  Eigen::MatrixXd basis;  // (near x 5) orthonormal, of all quadratics by their importance
+  double mean = 0;        // distance, m
+};
+
+Quadratic quadratic(std::vector<Neighbour> near) {
   const auto count = static_cast<Eigen::Index>(near.size());
-  double mean = 0;  // distance, by which all lengths are divided
-  for (const auto& [j, offset] : near) mean += std::abs(offset) / static_cast<double>(count);
+  Quadratic fit;
+  for (const Neighbour& each : near) fit.mean += std::abs(each.offset) / static_cast<double>(count);
+  const double mean = fit.mean;  // by which all lengths are divided
 
   Eigen::MatrixXd terms(count, 5);
-  VectorXd weights(count);
+  fit.importance.resize(count);
   for (Eigen::Index row = 0; row < count; ++row) {
-    constexpr double kNearest = 0.3;
+    constexpr double kNearest = 0.3;  // of what lies nearer no more is made
     const Plane2 d = near[static_cast<std::size_t>(row)].offset / mean;
     const double u = d.real(), v = d.imag();
-    weights[row] = 1 / std::pow(std::max(std::abs(d), kNearest), 2);
+    fit.importance[row] = 1 / std::pow(std::max(std::abs(d), kNearest), 3);
     terms.row(row) << u, v, u * u / 2, u * v, v * v / 2;
-    terms.row(row) *= weights[row];
+    terms.row(row) *= fit.importance[row];
   }
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> qr;
   qr.setThreshold(1e-6);
   qr.compute(terms);
-  const Eigen::MatrixXd inverse = qr.pseudoInverse();  // (5 x count)
-  return inverse.bottomRows<3>() * weights.asDiagonal() / (mean * mean);
+  const Eigen::MatrixXd inverse = qr.pseudoInverse() * fit.importance.asDiagonal();  // (5 x count)
+  fit.slope = inverse.topRows<2>() / mean;
+  fit.weights = inverse.bottomRows<3>() / (mean * mean);
+  fit.basis = qr.householderQ() * Eigen::MatrixXd::Identity(count, qr.rank());
+  fit.near = std::move(near);
+  return fit;
 }
+
+// Fits are right about a sheet that is bent evenly, and still it would not keep that shape under an
+// even moment where the mesh is uneven: it would find one of less energy, and be too limp. It keeps
+// it where the mean curvature of all depends on the slopes at the border alone, as in the plane the
+// integral of a second derivative does: sums over the fits of area times weight are then given for
+// every particle, 0 inside. What is added to the weights is the least that does it, and adds
+// nothing for quadratics. By conjugate gradients for the multipliers of those sums.
+class Balance {
+ public:
+  Balance(const RestShape& shape, const Fans& fans, std::vector<Quadratic>& fits)
+      : shape_(shape), fans_(fans), fits_(fits) {}
+
+  void restore() {
+    Matrix3Xd residual = border_slopes();
+    for (std::size_t i = 0; i < fits_.size(); ++i)
+      scatter(i, -fits_[i].area * fits_[i].weights, residual);
+    const double enough = kEnough * kEnough * product(area_weights(), area_weights());
+    const VectorXd diagonal = diagonals();
+    Matrix3Xd multiplier = Matrix3Xd::Zero(3, residual.cols()), along = multiplier;
+    double before = 0;
+    for (int k = 0; k < kMost && product(residual, residual) > enough; ++k) {
+      const Matrix3Xd scaled = residual * diagonal.cwiseInverse().asDiagonal();
+      const double now = product(residual, scaled);
+      along = before > 0 ? Matrix3Xd(scaled + now / before * along) : scaled;
+      before = now;
+      Matrix3Xd sums = Matrix3Xd::Zero(3, residual.cols());
+      for (std::size_t i = 0; i < fits_.size(); ++i)
+        scatter(i, fits_[i].area * added(i, along), sums);
+      const double step = now / product(along, sums);
+      multiplier += step * along;
+      residual -= step * sums;
+    }
+    for (std::size_t i = 0; i < fits_.size(); ++i) fits_[i].weights += added(i, multiplier);
+  }
+
+ private:
+  static constexpr double kEnough = 1e-3;  // of the weights
+  static constexpr int kMost = 60;
+
+  // of tensors uu, uv, vv
+  static double product(const Matrix3Xd& a, const Matrix3Xd& b) {
+    return a.cwiseProduct(b).rowwise().sum().dot(Vector3d(1, 2, 1));
+  }
+
+  Matrix3Xd area_weights() const {
+    Matrix3Xd all(3, static_cast<Eigen::Index>(fits_.size()));
+    for (std::size_t i = 0; i < fits_.size(); ++i)
+      all.col(static_cast<Eigen::Index>(i)) =
+          fits_[i].area * fits_[i].weights.rowwise().sum().cwiseAbs();
+    return all;
+  }
+
+  // What a fit weighs its neighbours and itself by, each in its own frame.
+  void scatter(std::size_t i, const Matrix3Xd& weights, Matrix3Xd& sums) const {
+    const auto& near = fits_[i].near;
+    for (std::size_t k = 0; k < near.size(); ++k) {
+      const Vector3d weight = weights.col(static_cast<Eigen::Index>(k));
+      sums.col(near[k].particle) +=
+          near[k].turn == Plane2(1) ? weight : Vector3d(into(near[k].turn) * weight);
+    }
+    sums.col(static_cast<Eigen::Index>(i)) -= weights.rowwise().sum();
+  }
+
+  // The part of the multipliers around a particle that no quadratic has, 1/m^2 (3 x near).
+  Matrix3Xd added(std::size_t i, const Matrix3Xd& multiplier) const {
+    const Quadratic& fit = fits_[i];
+    Matrix3Xd values(3, fit.importance.size());
+    for (std::size_t k = 0; k < fit.near.size(); ++k) {
+      const auto& [j, offset, turn] = fit.near[k];
+      Vector3d value = multiplier.col(j);
+      if (turn != Plane2(1)) value = into(std::conj(turn)) * value;
+      const auto column = static_cast<Eigen::Index>(k);
+      values.col(column) =
+          fit.importance[column] * (value - multiplier.col(static_cast<Eigen::Index>(i)));
+    }
+    values -= (values * fit.basis) * fit.basis.transpose();
+    return values * fit.importance.asDiagonal() / std::pow(fit.mean, 4);
+  }
+
+  VectorXd diagonals() const {
+    VectorXd all = VectorXd::Zero(static_cast<Eigen::Index>(fits_.size()));
+    for (std::size_t i = 0; i < fits_.size(); ++i) {
+      const Quadratic& fit = fits_[i];
+      const double scale = fit.area / std::pow(fit.mean, 4);
+      for (std::size_t k = 0; k < fit.near.size(); ++k) {
+        const auto row = static_cast<Eigen::Index>(k);
+        all[fit.near[k].particle] +=
+            scale * std::pow(fit.importance[row], 2) * (1 - fit.basis.row(row).squaredNorm());
+      }
+      all[static_cast<Eigen::Index>(i)] +=
+          scale *
+          (fit.importance.squaredNorm() - (fit.basis.transpose() * fit.importance).squaredNorm());
+    }
+    return all.cwiseMax(1e-12 * all.maxCoeff());
+  }
+
+  // Slopes at the border, by the normals and lengths of the edges there: 0 inside.
+  Matrix3Xd border_slopes() const {
+    Matrix3Xd sums = Matrix3Xd::Zero(3, static_cast<Eigen::Index>(fits_.size()));
+    for (std::size_t i = 0; i < fits_.size(); ++i) {
+      const auto particle = static_cast<int>(i);
+      const Corners::At* const begin = fans_.corners().begin(particle);
+      Plane2 normal = 0;  // m
+      for (const Corners::At* at = begin; at != fans_.corners().end(particle); ++at) {
+        const auto& corner = shape_.corners[static_cast<std::size_t>(at->triangle)];
+        const Vector2d opposite = corner[static_cast<std::size_t>((at->corner + 1) % 3)] -
+                                  corner[static_cast<std::size_t>((at->corner + 2) % 3)];
+        normal += fans_.at(particle).turns[static_cast<std::size_t>(at - begin)] *
+                  Plane2(opposite.y(), -opposite.x()) / 2.0;
+      }
+      if (std::abs(normal) < 1e-9 * fits_[i].mean) continue;
+      Eigen::Matrix<double, 3, 2> along;
+      along << normal.real(), 0, normal.imag() / 2, normal.real() / 2, 0, normal.imag();
+      scatter(i, along * fits_[i].slope, sums);
+    }
+    return sums;
+  }
+
+  const RestShape& shape_;
+  const Fans& fans_;
+  std::vector<Quadratic>& fits_;
+};
 
 // A part of a particle's area whose warp lies in one direction.
 struct Share {
@@ -172,11 +333,9 @@ std::vector<Share> shares(const RestShape& shape, const Fans& fans, int i) {
   return all;
 }
 
-CurvatureFit fit_along(int i, const std::vector<Neighbour>& near, const Eigen::Matrix3Xd& weights,
-                       const Share& share) {
-  const double c = share.turn.real(), s = share.turn.imag();
-  Eigen::Matrix3d turned;  // of uu, uv, vv
-  turned << c * c, 2 * c * s, s * s, -c * s, c * c - s * s, c * s, s * s, -2 * c * s, c * c;
+CurvatureFit fit_along(int i, const Quadratic& quadratic, const Share& share) {
+  const std::vector<Neighbour>& near = quadratic.near;
+  const Eigen::Matrix3d turned = into(share.turn);
   CurvatureFit fit;
   fit.area = share.area;
   fit.panel = share.panel;
@@ -185,7 +344,7 @@ CurvatureFit fit_along(int i, const std::vector<Neighbour>& near, const Eigen::M
   fit.particle.push_back(i);
   fit.weight.push_back({0, 0, 0});
   for (std::size_t k = 0; k < near.size(); ++k) {
-    const Vector3d weight = turned * weights.col(static_cast<Eigen::Index>(k));
+    const Vector3d weight = turned * quadratic.weights.col(static_cast<Eigen::Index>(k));
     fit.particle.push_back(near[k].particle);
     fit.weight.push_back({weight[0], weight[1], weight[2]});
     for (std::size_t d = 0; d < 3; ++d) fit.weight[0][d] -= fit.weight.back()[d];
@@ -199,15 +358,22 @@ std::vector<CurvatureFit> fit_curvature(const RestShape& shape) {
   constexpr std::size_t kEnough = 6;
   const Fans fans(shape);
   const std::vector<bool> on_border = border(shape);
-  std::vector<CurvatureFit> fits;
-  fits.reserve(static_cast<std::size_t>(shape.particles));
+  const VectorXd area = areas(shape);
+  std::vector<Quadratic> quadratics;
+  quadratics.reserve(static_cast<std::size_t>(shape.particles));
   for (int i = 0; i < shape.particles; ++i) {
-    const bool narrow = on_border[static_cast<std::size_t>(i)] || fans.at(i).ring.size() < kEnough;
-    const std::vector<Neighbour> near = narrow ? fans.widened(i) : fans.at(i).ring;
-    const Eigen::Matrix3Xd weights = quadratic(near);
-    for (const Share& share : shares(shape, fans, i))
-      fits.push_back(fit_along(i, near, weights, share));
+    const bool full = fans.at(i).ring.size() >= kEnough;
+    quadratics.push_back(quadratic(on_border[static_cast<std::size_t>(i)] ? fans.widened(i, 1)
+                                   : full                                 ? fans.ring(i)
+                                                                          : fans.widened(i, 2)));
+    quadratics.back().area = area[i];
   }
+  Balance(shape, fans, quadratics).restore();
+  std::vector<CurvatureFit> fits;
+  fits.reserve(quadratics.size());
+  for (int i = 0; i < shape.particles; ++i)
+    for (const Share& share : shares(shape, fans, i))
+      fits.push_back(fit_along(i, quadratics[static_cast<std::size_t>(i)], share));
   return fits;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/triangles/connections.h"
 #include "core/triangles/fit.h"
 #include "core/triangles/rest_shape.h"
 
@@ -13,10 +14,15 @@ const MeasuredTextile& measured(const SheetDefinition& sheet, int panel) {
   return std::get<MeasuredTextile>(textile_of(sheet, panel).model);
 }
 
-// Mass and drag go by area.
+// Mass and drag go by area, or are one for all.
 void set_particles(const SheetDefinition& sheet, const RestShape& shape, Mesh& mesh) {
   mesh.mass = VectorXd::Zero(shape.particles);
   VectorXd drag = mesh.mass;
+  if (const auto* raw = std::get_if<RawTextile>(&sheet.textile.model)) {
+    mesh.mass.setConstant(raw->particle_mass);
+    if (raw->air_drag > 0) mesh.drag = VectorXd::Constant(shape.particles, raw->air_drag);
+    return;
+  }
   for (std::size_t t = 0; t < shape.triangles.size(); ++t) {
     const MeasuredTextile& textile = measured(sheet, panel_of(shape, t));
     const double third = area(shape.corners[t]) / 3;
@@ -48,6 +54,11 @@ Mesh make_triangles(const SheetDefinition& sheet) {
   Mesh mesh;
   mesh.damping = sheet.textile.damping.value_or(kDefaultDamping);
   set_particles(sheet, shape, mesh);
+  mesh.triangles = shape.triangles;
+  if (std::holds_alternative<ChoiKo>(sheet.bending)) {
+    add_connections(sheet, shape, mesh);
+    return mesh;
+  }
 
   Surface& surface = mesh.surface;
   surface.pushes = resists_compression(sheet.bending);
@@ -67,7 +78,6 @@ Mesh make_triangles(const SheetDefinition& sheet) {
     Family& family = mesh.families.emplace_back(Family{FamilyKind::kDamp, 0, 0, {}, {}});
     for (const auto& [i, j] : edges(shape)) family.connections.add(i, j);
   }
-  mesh.triangles = shape.triangles;
   return mesh;
 }
 

@@ -14,10 +14,10 @@ inline const TriangleMesh& triangles_in(const SheetDefinition& sheet) {
 // The textile of a panel.
 const Textile& textile_of(const SheetDefinition& sheet, int panel);
 
-// Of all panels, kg/m^2.
+// Of all panels, kg/m^2. Precondition: textiles are measured.
 double least_density(const SheetDefinition& sheet);
 
-// A membrane and fitted curvatures, with edges that damp. Precondition: textiles are measured.
+// A membrane and fitted curvatures, with edges that damp; or, by ChoiKo, connections.
 Mesh make_triangles(const SheetDefinition& sheet);
 
 }  // namespace weft

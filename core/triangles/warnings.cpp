@@ -6,6 +6,8 @@
 #include "core/forces/membrane.h"
 #include "core/model/text.h"
 #include "core/motion/surface_bound.h"
+#include "core/triangles/connections.h"
+#include "core/triangles/rest_shape.h"
 #include "core/triangles/triangles.h"
 
 namespace weft {
@@ -55,6 +57,7 @@ void warn_of_slivers(const TriangleMesh& mesh, const Mesh& forces, const std::st
 
 void warn_of_size(const Scene& scene, const SheetDefinition& sheet, const Mesh& forces,
                   int limiting_particle, const std::string& field, Plan& plan) {
+  if (!std::holds_alternative<MeasuredTextile>(sheet.textile.model)) return;
   const double given = scene.environment.gravity.norm();
   const double gravity = given > 0 ? given : kStandardGravity;
   const auto& textile = std::get<MeasuredTextile>(sheet.textile.model);
@@ -75,6 +78,20 @@ void warn_of_size(const Scene& scene, const SheetDefinition& sheet, const Mesh& 
          join("with edges of ", 1e3 * sheet.spacing(),
               " mm bending, not tension, makes the step: it grows with the square of their "
               "length")});
+}
+
+// What edges make of a measured textile depends on the mesh.
+void warn_of_connections(const SheetDefinition& sheet, std::size_t index, Plan& plan) {
+  if (!std::holds_alternative<ChoiKo>(sheet.bending) ||
+      !std::holds_alternative<MeasuredTextile>(sheet.textile.model))
+    return;
+  Mesh unused;
+  const ConnectionError error = add_connections(sheet, rest_shape(triangles_in(sheet)), unused);
+  plan.warnings.push_back(
+      {"MESH_DEPENDENT", join("sheets[", index, "].bending.choi_ko"),
+       join("connections along edges follow the mesh: by direction this sheet bends ",
+            error.least_bend, " to ", error.most_bend, " times and stretches ", error.least_stretch,
+            " to ", error.most_stretch, " times as measured; ISOMETRIC does as measured")});
 }
 
 void warn_of_compression(const Mesh& forces, const Matrix3Xd& x, const std::string& field,
@@ -116,6 +133,7 @@ void warn_of_triangles(const Scene& scene, std::size_t index, const PlannedSheet
   warn_of_slivers(triangles_in(sheet), planned.mesh, field, plan);
   warn_of_size(scene, sheet, planned.mesh, limiting_particle, field, plan);
   warn_of_compression(planned.mesh, planned.x, field, plan);
+  warn_of_connections(sheet, index, plan);
 }
 
 }  // namespace weft

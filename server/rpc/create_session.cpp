@@ -33,6 +33,12 @@ std::int64_t particles_of(const v1::Scene& scene) {
   return particles;
 }
 
+// What is uploaded is large, as a rule.
+bool names_asset(const v1::Scene& scene) {
+  return std::any_of(scene.sheets().begin(), scene.sheets().end(),
+                     [](const v1::Sheet& sheet) { return sheet.triangles().has_asset(); });
+}
+
 std::int64_t particles_of(const Scene& scene) {
   std::int64_t particles = 0;
   for (const SheetDefinition& sheet : scene.sheets) particles += sheet.particle_count();
@@ -73,7 +79,8 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
   // what a full server refuses does not wait for the plans of others
   if (const auto status = refusal(who, *request, request->session_id()); !status.ok())
     return answer(context, status);
-  return create_later(particles_of(request->session().scene()), response,
+  const v1::Scene& scene = request->session().scene();
+  return create_later(names_asset(scene) ? kLarge + 1 : particles_of(scene), response,
                       [this, who, request = *request](v1::Session& session) {
                         return create(who, request, session);
                       });

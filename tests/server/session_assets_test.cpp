@@ -72,12 +72,21 @@ TEST_F(SessionAssets, HaveLargeValuesInNeitherLogNorSnapshots) {
 }
 
 TEST_F(SessionAssets, GoOnAfterARestartWithTheSameFrames) {
-  const v1::Session session = service_->create(scene_of(mesh_));
-  service_->step(session, 20);
-  const auto before = frames(session, 20);
-  restart();
-  expect_equal(frames(session, 20), before);
-  EXPECT_EQ(asset_of(session), name_);
+  for (const int snapshot_ms : {2000, 0}) {  // by the log; by snapshots
+    snapshot_ms_ = snapshot_ms;
+    restart();
+    const v1::Session session = service_->create(scene_of(mesh_));
+    service_->step(session, 20);
+    restart();
+    service_->step(session, 5);
+    const v1::Session undisturbed = service_->create(scene_of(name_));
+    service_->step(undisturbed, 25);
+    const auto newest = [&](const v1::Session& of) {
+      return Stream(*service_, frames_of(of, 25, 25)).rest();
+    };
+    expect_equal(newest(session), newest(undisturbed));
+    EXPECT_EQ(asset_of(session), name_);
+  }
   v1::ListSessionsResponse listed;
   ASSERT_TRUE(service_->call(&Sessions::ListSessions, {}, &listed).ok());
   EXPECT_EQ(listed.sessions(0).scene().sheets(0).triangles().asset(), name_);

@@ -10,6 +10,7 @@
 #include "core/motion/stability.h"
 #include "core/motion/surface_bound.h"
 #include "core/simulation.h"
+#include "core/triangles/connections.h"
 #include "core/triangles/triangles.h"
 #include "tests/support/core/scenes.h"
 #include "tests/support/core/triangle_meshes.h"
@@ -224,14 +225,51 @@ TEST(Meshes, FaultsOfTrianglesAreNamedWithTheirPlace) {
                    "mesh.panels: have 3 triangles; the mesh has 8"));
 }
 
-TEST(Meshes, RawTextilesAndTheBendingOfGridsAreRefused) {
+TEST(Meshes, RawTextilesNeedConnections) {
   Scene scene = scene_of(triangle_mesh(square(Cut::kRight, 0.1, 0.05)));
   scene.sheets[0].textile.model = RawTextile{.particle_mass = 0.001, .stretch = 100};
-  scene.sheets[0].bending = ChoiKo{};
   const auto problems = find_problems(scene);
-  ASSERT_EQ(problems.size(), 2U);
+  ASSERT_EQ(problems.size(), 1U);
   EXPECT_EQ(problems[0].field, "sheets[0].textile.raw");
-  EXPECT_EQ(problems[1].field, "sheets[0].bending.choi_ko");
+  scene.sheets[0].bending = ChoiKo{};
+  EXPECT_TRUE(find_problems(scene).empty());
+}
+
+TEST(Meshes, ConnectionsBendAndStretchAnEvenTextileRightOnEquilateralTrianglesAlone) {
+  MeasuredTextile even = cotton();
+  even.tensile_weft = even.tensile_warp;
+  even.shear = even.tensile_warp / 2;  // no direction of its own
+  even.bend_rigidity_weft = even.bend_rigidity_warp;
+  const auto error_on = [&](Cut cut) {
+    SheetDefinition sheet = sheet_of(triangle_mesh(square(cut, 1, 0.04)));
+    sheet.textile.model = even;
+    sheet.bending = ChoiKo{};
+    Mesh mesh;
+    return add_connections(sheet, rest_shape(triangles_in(sheet)), mesh);
+  };
+  const ConnectionError equilateral = error_on(Cut::kEquilateral);
+  EXPECT_NEAR(equilateral.least_stretch, 1, 0.02);  // what is left is the border's
+  EXPECT_NEAR(equilateral.most_stretch, 1, 0.02);
+  EXPECT_NEAR(equilateral.least_bend, 1, 0.1);
+  EXPECT_NEAR(equilateral.most_bend, 1, 0.1);
+  const ConnectionError right = error_on(Cut::kRight);
+  EXPECT_GT(right.most_bend / right.least_bend, 1.3);
+}
+
+TEST(Meshes, ThePapersLawHangsASheetAndSaysThatItDependsOnTheMesh) {
+  Scene scene = scene_of(triangle_mesh(square(Cut::kIrregular, 0.2, 0.04)));
+  SheetDefinition& sheet = scene.sheets[0];
+  sheet.pins = {{{0, 5}, {}}};
+  for (const Evaluator evaluator :
+       {Evaluator::kSeries, Evaluator::kExact, Evaluator::kLinearized, Evaluator::kPolynomial}) {
+    sheet.bending = ChoiKo{.evaluator = evaluator};
+    Simulation simulation(scene);
+    for (int k = 0; k < 30; ++k) ASSERT_TRUE(simulation.advance_frame()) << simulation.failure();
+    EXPECT_TRUE(simulation.repairs().empty());
+    const auto& warnings = simulation.plan().warnings;
+    EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(),
+                            [](const Warning& each) { return each.code == "MESH_DEPENDENT"; }));
+  }
 }
 
 }  // namespace

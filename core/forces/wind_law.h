@@ -1,0 +1,28 @@
+#pragma once
+
+#include <array>
+
+#include "core/model/scene.h"
+
+namespace weft {
+
+// Moving air, as it presses on triangles (see add_wind_forces()).
+template <class T>
+struct WindLaw {
+  bool blows = false;
+  std::array<T, 3> velocity{};  // of the air, m/s
+  T to_velocity = 0;            // 1 / (6 dt): what the sum of three w is multiplied by, 1/s
+  T pressure = 0;               // rho / 12, kg/m^3
+  T drag = 0;                   // c_t / 6, kg/(m^2 s)
+};
+
+template <class T>
+WindLaw<T> make_wind_law(const Wind& wind) {
+  WindLaw<T> law;
+  law.blows = true;
+  law.pressure = static_cast<T>(wind.air_density / 12);
+  law.drag = static_cast<T>(wind.tangential_drag / 6);
+  return law;
+}
+
+}  // namespace weft

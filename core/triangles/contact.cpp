@@ -1,0 +1,123 @@
+#include "core/triangles/contact.h"
+
+#include <limits>
+
+// compiled again for every target
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/triangles/contact.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "core/contact/places-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace weft::HWY_NAMESPACE {
+
+// x, y and z of some particles, one after the other.
+struct Lanes {
+  static constexpr std::size_t kMost = hn::MaxLanes(ContactTag());
+  HWY_ALIGN double axis[3][kMost];
+
+  HWY_INLINE Places load() const {
+    const ContactTag d;
+    return {hn::Load(d, axis[0]), hn::Load(d, axis[1]), hn::Load(d, axis[2])};
+  }
+  HWY_INLINE void store(const Places& places) {
+    const ContactTag d;
+    hn::Store(places.x, d, axis[0]);
+    hn::Store(places.y, d, axis[1]);
+    hn::Store(places.z, d, axis[2]);
+  }
+};
+
+template <class T>
+double resolve_block_as(const Contacts& contacts, const Vector3d& origin, bool compensated,
+                        int block, TriangleState<T>& state) {
+  const ContactTag d;
+  const Reals skin = real(contacts.skin()), far = real(std::numeric_limits<double>::infinity());
+  constexpr std::size_t kBlock = TriangleLaw<T>::kBlock, kValues = 4;
+  const std::size_t begin = static_cast<std::size_t>(block) * kBlock * kValues;
+  Reals nearest = far;
+  for (std::size_t first = begin; first < begin + kBlock * kValues;
+       first += kValues * Lanes::kMost) {
+    const auto exact = [&](const AlignedArray<T>& plane, const AlignedArray<T>& error) HWY_ATTR {
+      Lanes lanes;
+      for (std::size_t k = 0; k < Lanes::kMost; ++k)
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const std::size_t i = first + k * kValues + axis;
+          lanes.axis[axis][k] =
+              compensated ? double{plane.data()[i]} - double{error.data()[i]} : plane.data()[i];
+        }
+      return lanes.load();
+    };
+    HWY_ALIGN double mobile[Lanes::kMost];
+    for (std::size_t k = 0; k < Lanes::kMost; ++k) mobile[k] = state.step2.data()[first + k * 4];
+
+    const auto free = hn::Gt(hn::Load(d, mobile), real(0));
+    Places x = plus(everywhere(origin), exact(state.x, state.x_error));
+    Reals gap = far;
+    for (const Contacts::Placed& placed : contacts.placed())
+      gap = hn::Min(gap, hn::Sub(distances(placed, x).value, skin));
+    gap = hn::IfThenElse(free, gap, far);
+    nearest = hn::Min(nearest, gap);
+    const auto touching = hn::Lt(gap, real(0));
+    if (hn::AllFalse(d, touching)) continue;
+
+    const Places before = exact(state.d, state.d_error);
+    Places moved = before;
+    resolve_places(contacts, touching, x, moved);
+
+    HWY_ALIGN double touched[Lanes::kMost];
+    hn::Store(hn::IfThenElseZero(touching, real(1)), d, touched);
+    Lanes place, displacement, change;
+    place.store(minus(x, everywhere(origin)));
+    displacement.store(moved);
+    change.store(times(minus(moved, before), real(3)));
+    for (std::size_t k = 0; k < Lanes::kMost; ++k) {
+      if (touched[k] == 0) continue;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const std::size_t i = first + k * kValues + axis;
+        const auto set = [&](AlignedArray<T>& plane, AlignedArray<T>& error, double value) {
+          const T rounded = plane.data()[i] = static_cast<T>(value);
+          if (compensated) error.data()[i] = static_cast<T>(double{rounded} - value);
+        };
+        set(state.x, state.x_error, place.axis[axis][k]);
+        set(state.d, state.d_error, displacement.axis[axis][k]);
+        state.w.data()[i] += static_cast<T>(change.axis[axis][k]);
+      }
+    }
+  }
+  return hn::GetLane(hn::MinOfLanes(d, nearest));
+}
+
+double resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int block,
+                      TriangleState<float>& state) {
+  return resolve_block_as(contacts, origin, compensated, block, state);
+}
+double resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int block,
+                      TriangleState<double>& state) {
+  return resolve_block_as(contacts, origin, compensated, block, state);
+}
+
+}  // namespace weft::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace weft {
+
+HWY_EXPORT(resolve_single);
+HWY_EXPORT(resolve_double);
+
+template <>
+double resolve_block(const Contacts& contacts, const Vector3d& origin, bool compensated, int block,
+                     TriangleState<float>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, block, state);
+}
+template <>
+double resolve_block(const Contacts& contacts, const Vector3d& origin, bool compensated, int block,
+                     TriangleState<double>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, block, state);
+}
+
+}  // namespace weft
+#endif

@@ -1,0 +1,268 @@
+#include "core/triangles/solver.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "core/motion/saved_values.h"
+#include "core/triangles/contact.h"
+#include "core/triangles/law.h"
+#include "core/triangles/sweep.h"
+
+namespace weft {
+namespace {
+
+template <class T>
+class TriangleSolver : public SheetSolver {
+ public:
+  TriangleSolver(const Mesh& mesh, const Dynamics& dynamics, const std::optional<Wind>& wind,
+                 bool compensated)
+      : mesh_(mesh),
+        dynamics_(dynamics),
+        particles_(static_cast<int>(mesh.mass.size())),
+        law_(make_triangle_law<T>(mesh, wind.has_value())),
+        state_(particles_, compensated),
+        gap_(law_.blocks.size()) {
+    law_.compensated = compensated;
+    if (wind) law_.wind = make_wind_law<T>(*wind);
+  }
+
+  void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
+    dt_ = dt;
+    if (law_.compensated && !std::exchange(started_, true)) {
+      // one after the other: reductions add in an order that depends on where origin_ lies
+      for (const auto& position : x.colwise()) origin_ += position;
+      origin_ /= particles_;
+    }
+    set_step();
+    // half a kick: x(-dt) = x - v dt + a dt^2 / 2
+    Matrix3Xd a;
+    accelerate(dynamics_, time, x, v, a);
+    for (int i = 0; i < particles_; ++i) {
+      set(state_.x, state_.x_error, i, x.col(i) - origin_);
+      set(state_.d, state_.d_error, i, v.col(i) * dt - a.col(i) * (dt * dt / 2));
+      put(state_.w, i, v.col(i) * (2 * dt));
+      put(state_.step2, i, Vector3d::Constant(dynamics_.inverse_mass[i] * dt * dt));
+      if (law_.drags)
+        put(state_.drag, i, Vector3d::Constant(dynamics_.drag[i] * dynamics_.inverse_mass[i] * dt));
+    }
+    std::fill(gap_.begin(), gap_.end(), 0);
+    least_gap_ = come_ = 0;
+  }
+
+  void advance(double time, ThreadPool& pool) override {
+    complete();
+    const Vector3d air =
+        law_.drags || law_.wind.blows ? dynamics_.air(time) : Vector3d(Vector3d::Zero());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double speed = air[static_cast<Eigen::Index>(axis)];
+      law_.drift[axis] =
+          static_cast<T>(dynamics_.gravity[static_cast<Eigen::Index>(axis)] * (dt_ * dt_));
+      law_.air[axis] = static_cast<T>(speed * dt_);
+      law_.wind.velocity[axis] = static_cast<T>(speed);
+    }
+    moved_ = sweep(law_, state_, bands(pool), pool);
+  }
+
+  void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
+    set(state_.x, state_.x_error, particle, x - origin_);
+    const std::size_t at = place(particle);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      state_.w.data()[at + axis] =
+          static_cast<T>(3 * d[static_cast<Eigen::Index>(axis)]) - state_.d.data()[at + axis];
+    set(state_.d, state_.d_error, particle, d);
+  }
+
+  // A block is looked at again when it, or a collider, may have come as far as its gap was wide.
+  void resolve(const Contacts& contacts, ThreadPool& pool) override {
+    law_.measured = true;
+    constexpr double kRounding = 1.001;
+    come_ += kRounding * (moved_ + contacts.reach());
+    if (come_ < least_gap_) return;
+    near_.clear();
+    for (std::size_t b = 0; b < gap_.size(); ++b)
+      if ((gap_[b] -= come_) <= 0) near_.push_back(static_cast<int>(b));
+    come_ = 0;
+
+    const bool in_parts = contacts.may_cross(moved_);
+    const int count = static_cast<int>(near_.size());
+    const int parts = std::clamp(count, 1, bands(pool));
+    const auto resolve_part = [&](int part) {
+      for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
+        const int b = near_[static_cast<std::size_t>(i)];
+        gap_[static_cast<std::size_t>(b)] =
+            in_parts ? resolve_in_parts(contacts, b)
+                     : resolve_block(contacts, origin_, law_.compensated, b, state_);
+      }
+    };
+    if (parts == 1)
+      resolve_part(0);
+    else
+      pool.run(parts, resolve_part);
+    least_gap_ = *std::min_element(gap_.begin(), gap_.end());
+  }
+
+  // Smaller shares cost more to share than they take.
+  int most_threads() const override {
+    constexpr int kParticles = 2048;
+    return std::max(1, particles_ / kParticles);
+  }
+
+  // The law is made again from the mesh.
+  void release_memory() override {
+    state_.release_memory();
+    law_.release();
+  }
+
+  void positions(Matrix3Xd& x) const override {
+    x.resize(3, particles_);
+    for (int i = 0; i < particles_; ++i)
+      x.col(i) = origin_ + exact(state_.x, state_.x_error, place(i));
+  }
+  void velocities(Matrix3Xd& v) const override {
+    v.resize(3, particles_);
+    const double scale = 1 / (2 * dt_);
+    for (int i = 0; i < particles_; ++i)
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        v(static_cast<Eigen::Index>(axis), i) = scale * double{state_.w.data()[place(i) + axis]};
+  }
+  // v = d / dt + a dt / 2: d stands for the velocity half a step ago
+  void closing_velocities(double time, Matrix3Xd& v) const override {
+    Matrix3Xd x, a;
+    positions(x);
+    velocities(v);
+    accelerate(dynamics_, time, x, v, a);
+    for (int i = 0; i < particles_; ++i)
+      v.col(i) = exact(state_.d, state_.d_error, place(i)) / dt_ + a.col(i) * (dt_ / 2);
+  }
+
+  std::string save() const override {
+    SavedValues saved;
+    saved.put(kind());
+    saved.put(origin_.data(), 3);
+    saved.put(law_.measured ? 1 : 0);
+    saved.put(come_);
+    saved.put(gap_.data(), gap_.size());
+    for (const AlignedArray<T>* plane : {&state_.x, &state_.w, &state_.d, &state_.step2,
+                                         &state_.drag, &state_.x_error, &state_.d_error})
+      saved.put(plane->data(), plane->size());
+    return saved.bytes();
+  }
+  bool load(const std::string& saved) override {
+    LoadedValues loaded(saved);
+    int saved_kind = 0, measured = 0;
+    loaded.take(&saved_kind, 1);
+    if (saved_kind != kind()) return false;
+    loaded.take(origin_.data(), 3);
+    loaded.take(&measured, 1);
+    law_.measured = measured != 0;
+    loaded.take(&come_, 1);
+    loaded.take(gap_.data(), gap_.size());
+    least_gap_ = *std::min_element(gap_.begin(), gap_.end());
+    for (AlignedArray<T>* plane : {&state_.x, &state_.w, &state_.d, &state_.step2, &state_.drag,
+                                   &state_.x_error, &state_.d_error})
+      loaded.take(plane->data(), plane->size());
+    return loaded.all_taken();
+  }
+
+ private:
+  // What planes are saved; no kind of a lattice's.
+  int kind() const {
+    return 1 << 16 | law_.drags << 5 | law_.compensated << 4 | static_cast<int>(sizeof(T));
+  }
+
+  int bands(const ThreadPool& pool) const { return std::min(pool.threads(), most_threads()); }
+
+  // What the law takes from the length of a step.
+  void set_step() {
+    law_.damping = static_cast<T>(mesh_.damping / (2 * dt_));
+    law_.wind.to_velocity = static_cast<T>(1 / (6 * dt_));
+    law_.drags = dynamics_.drag.size() > 0;
+    if (law_.drags && state_.drag.size() == 0) state_.drag = AlignedArray<T>(state_.size());
+  }
+  // After release_memory().
+  void complete() {
+    if (law_.released()) law_.restore(mesh_);
+    state_.prepare(law_);
+  }
+
+  // Where the values of a particle begin.
+  std::size_t place(int particle) const {
+    return 4 * static_cast<std::size_t>(law_.place[static_cast<std::size_t>(particle)]);
+  }
+
+  Vector3d exact(const AlignedArray<T>& plane, const AlignedArray<T>& error, std::size_t at) const {
+    Vector3d v;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double& value = v[static_cast<Eigen::Index>(axis)] = double{plane.data()[at + axis]};
+      if (law_.compensated) value -= double{error.data()[at + axis]};
+    }
+    return v;
+  }
+  void set(AlignedArray<T>& plane, AlignedArray<T>& error, int particle, const Vector3d& exact) {
+    set_at(plane, error, place(particle), exact);
+  }
+  void set_at(AlignedArray<T>& plane, AlignedArray<T>& error, std::size_t at,
+              const Vector3d& exact) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double value = exact[static_cast<Eigen::Index>(axis)];
+      const T rounded = plane.data()[at + axis] = static_cast<T>(value);
+      if (law_.compensated) error.data()[at + axis] = static_cast<T>(double{rounded} - value);
+    }
+  }
+  void put(AlignedArray<T>& plane, int particle, const Vector3d& values) {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      plane.data()[place(particle) + axis] =
+          static_cast<T>(values[static_cast<Eigen::Index>(axis)]);
+  }
+
+  // As resolve_block(), where particles may come through colliders unseen.
+  double resolve_in_parts(const Contacts& contacts, int block) {
+    constexpr std::size_t kValues = 4 * TriangleLaw<T>::kBlock;
+    double nearest = std::numeric_limits<double>::infinity();
+    const std::size_t begin = static_cast<std::size_t>(block) * kValues;
+    for (std::size_t at = begin; at < begin + kValues; at += 4) {
+      if (state_.step2.data()[at] == 0) continue;
+      Vector3d x = origin_ + exact(state_.x, state_.x_error, at);
+      Vector3d d = exact(state_.d, state_.d_error, at);
+      const Vector3d before = d;
+      if (contacts.resolve(x, d)) {
+        set_at(state_.x, state_.x_error, at, x - origin_);
+        set_at(state_.d, state_.d_error, at, d);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const auto k = static_cast<Eigen::Index>(axis);
+          state_.w.data()[at + axis] += static_cast<T>(3 * (d[k] - before[k]));
+        }
+      }
+      nearest = std::min(nearest, contacts.gap(x));
+    }
+    return nearest;
+  }
+
+  const Mesh& mesh_;
+  const Dynamics& dynamics_;
+  int particles_;
+  double dt_ = 0;
+  TriangleLaw<T> law_;
+  TriangleState<T> state_;
+  bool started_ = false;
+  Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
+  double moved_ = 0;                    // farthest displacement of the last step, at most, m
+  std::vector<double> gap_;             // of each block to the nearest skin, at least, m
+  double least_gap_ = 0;                // of all blocks
+  double come_ = 0;                     // how far sheet and colliders may have come since, m
+  std::vector<int> near_;               // blocks that may touch, in this step
+};
+
+}  // namespace
+
+std::unique_ptr<SheetSolver> make_triangle_solver(const Mesh& mesh, const Dynamics& dynamics,
+                                                  const std::optional<Wind>& wind,
+                                                  const SolverSettings& settings) {
+  if (settings.precision == Precision::kDouble)
+    return std::make_unique<TriangleSolver<double>>(mesh, dynamics, wind, false);
+  return std::make_unique<TriangleSolver<float>>(mesh, dynamics, wind, settings.compensated);
+}
+
+}  // namespace weft

@@ -1,0 +1,38 @@
+#pragma once
+
+#include "core/triangles/law.h"
+
+namespace weft {
+
+// A sheet of triangles in motion. Of every particle, four values of each, the last of them 0.
+template <class T>
+struct TriangleState {
+  TriangleState(int particles, bool compensated);
+
+  AlignedArray<T> x;        // position, m
+  AlignedArray<T> w;        // 3 d - d_previous: velocity x 2 dt, m
+  AlignedArray<T> d;        // displacement of the last step, m
+  AlignedArray<T> step2;    // dt^2 / mass, s^2/kg; 0 holds a particle
+  AlignedArray<T> drag;     // c dt / m; or empty
+  AlignedArray<T> x_error;  // what rounding has added to x, m; with compensation only, as the next
+  AlignedArray<T> d_error;  // what rounding has added to d, m
+
+  // What only sweeps need: the next x and w, tensions (groups x 3 x kLanes, then a 0), forces of
+  // wind on a triangle's corners.
+  AlignedArray<T> next_x, next_w, tension, wind;
+  void release_memory();
+  void prepare(const TriangleLaw<T>& law);
+
+  std::size_t size() const { return x.size(); }
+};
+
+// Largest displacements along each axis, m.
+template <class T>
+using Farthest = std::array<T, 4>;
+
+// One substep of all triangles, then of all particles. Equal bits on every processor with FMA, and
+// for every number of bands. Returns a bound of the largest displacement where law.measured, m.
+template <class T>
+T sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool);
+
+}  // namespace weft

@@ -6,6 +6,10 @@
 #include <compare>
 #include <random>
 
+#include "core/forces/elastic.h"
+#include "core/motion/sheet_solver.h"
+#include "tests/support/core/scenes.h"
+
 namespace weft::testing {
 
 RestShape scattered(int columns, double spacing) {
@@ -73,6 +77,38 @@ RestShape scattered(int columns, double spacing) {
     }
   }
   return rest_shape(points, triangles);
+}
+
+double measured_step(const Mesh& mesh, const Matrix3Xd& x) {
+  Dynamics dynamics;
+  dynamics.inverse_mass = mesh.mass.cwiseInverse();
+  dynamics.gravity.setZero();
+  // forces about the strained shape, which is then at rest
+  Matrix3Xd held = Matrix3Xd::Zero(3, x.cols());
+  add_elastic_forces(mesh, x, Matrix3Xd::Zero(3, x.cols()), held);
+  dynamics.force = [&](double, const Matrix3Xd& at, const Matrix3Xd& v, Matrix3Xd& force) {
+    force = -held;
+    add_elastic_forces(mesh, at, v, force);
+  };
+  const auto grows = [&](double dt) {
+    const auto solver = make_plain_solver(dynamics, IntegratorKind::kVerlet);
+    const Matrix3Xd start = x + 1e-9 * noise(static_cast<int>(x.cols()));
+    solver->start(start, Matrix3Xd::Zero(3, x.cols()), 0, dt);
+    Matrix3Xd now;
+    for (int k = 0; k < 1500; ++k) {
+      solver->advance(k * dt, calling_thread());
+      if (k % 50 != 0) continue;
+      solver->positions(now);
+      if (!((now - x).cwiseAbs().maxCoeff() < 1e-6)) return true;
+    }
+    return false;
+  };
+  double low = 1e-6, high = 1e-2;
+  while (high / low > 1.003) {
+    const double middle = std::sqrt(low * high);
+    (grows(middle) ? high : low) = middle;
+  }
+  return low;
 }
 
 }  // namespace weft::testing

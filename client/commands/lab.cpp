@@ -20,6 +20,10 @@ struct LabOptions {
   std::string textile;
   std::string direction = "warp";
   bool isometric = false;
+  v1::LabMesh mesh = v1::LAB_MESH_UNSPECIFIED;
+
+  bool of_triangles() const { return mesh > v1::LAB_MESH_LATTICE; }
+
   v1::Evaluator evaluator = v1::EVALUATOR_UNSPECIFIED;
   std::optional<int> segments;
   bool fold_clamp = false;
@@ -33,7 +37,8 @@ v1::RunTestRequest request_of(const LabOptions& options) {
   v1::RunTestRequest request;
   request.set_test(options.test);
   *request.mutable_textile() = textile_named(options.textile);
-  if (options.isometric) {
+  request.set_mesh(options.mesh);
+  if (options.isometric || options.of_triangles()) {
     request.mutable_bending()->mutable_isometric();
   } else {
     v1::ChoiKo* law = request.mutable_bending()->mutable_choi_ko();
@@ -192,8 +197,9 @@ void write_text(const std::string& path, const std::string& text) {
 void run_lab(Context& context, const LabOptions& options) {
   const v1::LabReport report = report_of(context, request_of(options));
   if (!options.csv.empty())
-    write_text(options.csv,
-               options.test == v1::LAB_TEST_BENDING ? curves_csv(report) : values_csv(report));
+    write_text(options.csv, options.test == v1::LAB_TEST_BENDING && !report.curves().empty()
+                                ? curves_csv(report)
+                                : values_csv(report));
   if (!options.svg.empty()) {
     Plot plot = report.curves().empty() ? plot_of_values(report) : plot_of_curves(report);
     plot.title = options.name + " of " + options.textile;
@@ -239,6 +245,16 @@ void add_test(CLI::App& lab, Context& context, const char* name, v1::LabTest tes
       ->check(CLI::IsMember({"warp", "weft"}))
       ->option_text("warp|weft");
   if (test != v1::LAB_TEST_CHAIN) add_bending_options(*command, *options);
+  static const std::map<std::string, v1::LabMesh> meshes{{"lattice", v1::LAB_MESH_LATTICE},
+                                                         {"right", v1::LAB_MESH_RIGHT},
+                                                         {"alternating", v1::LAB_MESH_ALTERNATING},
+                                                         {"equilateral", v1::LAB_MESH_EQUILATERAL},
+                                                         {"irregular", v1::LAB_MESH_IRREGULAR}};
+  command
+      ->add_option("--mesh", options->mesh,
+                   "What the specimen is made of [lattice]; triangles bend isometrically")
+      ->transform(one_of(meshes))
+      ->option_text("lattice|right|alternating|equilateral|irregular");
   command->add_option("--spacing", options->spacings_mm, "Spacings of the mesh; else a range")
       ->option_text("MM ...");
   const bool bending = test == v1::LAB_TEST_BENDING;

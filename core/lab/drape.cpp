@@ -267,7 +267,7 @@ Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, Cut
                   double radius, double held_radius, double spacing) {
   Specimen disc = cut(textile, bending, cut_disc(mesh, radius, spacing), spacing);
   for (Eigen::Index i = 0; i < disc.held.size(); ++i)
-    disc.held[i] = disc.start.col(i).norm() <= held_radius + spacing / 4 ? 1 : 0;
+    disc.held[i] = disc.start.col(i).norm() <= held_radius + spacing ? 1 : 0;
   return disc;
 }
 

@@ -10,7 +10,8 @@ namespace weft {
 Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, double radius,
                   double held_radius, double spacing);
 
-// The same of triangles, with a round outline.
+// The same of triangles, with a round outline. Held up to a spacing beyond held_radius: the last
+// particles held lie half a spacing beyond it in the mean, and the clamp acts as far inside them.
 Specimen cut_disc(const MeasuredTextile& textile, const BendingLaw& bending, Cut mesh,
                   double radius, double held_radius, double spacing);
 

@@ -253,6 +253,7 @@ void hang_on_both_sides(const LabOrder& order, double overhang, int columns,
   const Eigen::Matrix2Xd shape = overhang * heavy_elastica(kCantileverQ, kFine + 1);
   const Matrix3Xd flat = strip.start;
   std::vector<Eigen::Index> middle;  // particles, of one side
+  Eigen::Index end = 0;              // the one at its tip
   for (Eigen::Index i = 0; i < flat.cols(); ++i) {
     const double along = std::abs(flat(0, i)), off = std::abs(flat(2, i) - width / 2);
     strip.held[i] = along < 0.6 * step ? 1 : 0;
@@ -261,6 +262,10 @@ void hang_on_both_sides(const LabOrder& order, double overhang, int columns,
       strip.start.col(i).head<2>() =
           Eigen::Vector2d(std::copysign(shape(0, at), flat(0, i)), -shape(1, at));
     if (flat(0, i) >= 0 && off < 0.51 * spacing) middle.push_back(i);
+    const auto beyond = [&](Eigen::Index k) {
+      return 100 * flat(0, k) - std::abs(flat(2, k) - width / 2);
+    };
+    if (beyond(i) > beyond(end)) end = i;
   }
   std::sort(middle.begin(), middle.end(),
             [&](Eigen::Index a, Eigen::Index b) { return flat(0, a) < flat(0, b); });
@@ -268,7 +273,7 @@ void hang_on_both_sides(const LabOrder& order, double overhang, int columns,
   const Equilibrium rest = find_equilibrium(strip.mesh, strip.held, {0, -kStandardGravity, 0},
                                             strip.start, tolerance, stop);
   note_unsettled(rest, tolerance, report);
-  const Vector3d tip = rest.x.col(middle.back());
+  const Vector3d tip = rest.x.col(end);
   report.values.push_back(value("chord angle", "degrees", strip,
                                 chord_angle(shape(0, kFine), shape(1, kFine)),
                                 chord_angle(tip.x(), -tip.y())));
@@ -447,7 +452,8 @@ std::vector<Problem> find_problems(const LabOrder& order) {
   const MeasuredTextile textile = along_warp(order);
   const std::string along = order.weft ? "weft" : "warp";
   if (order.mesh && std::holds_alternative<ChoiKo>(order.bending))
-    problems.push_back({"bending", "is CHOI_KO, which triangles do not have; ISOMETRIC is theirs"});
+    problems.push_back(
+        {"bending", "is CHOI_KO, which is tested on a lattice alone; on triangles ISOMETRIC is"});
   if (order.test == LabTest::kBending && !order.mesh &&
       !std::holds_alternative<ChoiKo>(order.bending))
     problems.push_back({"bending", "is ISOMETRIC, which has no curve; the test is of CHOI_KO"});

@@ -203,7 +203,6 @@ class Balance {
       scatter(i, -fits_[i].area * fits_[i].weights, residual);
     const double enough = kEnough * kEnough * product(area_weights(), area_weights());
     const VectorXd diagonal = diagonals();
-    if (diagonal.maxCoeff() <= 0) return;  // no fit has more neighbours than it needs
     Matrix3Xd multiplier = Matrix3Xd::Zero(3, residual.cols()), along = multiplier;
     double before = 0;
     for (int k = 0; k < kMost && product(residual, residual) > enough; ++k) {
@@ -214,9 +213,8 @@ class Balance {
       Matrix3Xd sums = Matrix3Xd::Zero(3, residual.cols());
       for (std::size_t i = 0; i < fits_.size(); ++i)
         scatter(i, fits_[i].area * added(i, along), sums);
-      const double stiffness = product(along, sums);
-      if (stiffness <= 0) break;
-      const double step = now / stiffness;
+      sums += along * (kSlight * diagonal).asDiagonal();
+      const double step = now / product(along, sums);
       multiplier += step * along;
       residual -= step * sums;
     }
@@ -225,6 +223,7 @@ class Balance {
 
  private:
   static constexpr double kEnough = 1e-3;  // of the weights
+  static constexpr double kSlight = 1e-3;  // where fits are free to give nothing
   static constexpr int kMost = 60;
 
   // of tensors uu, uv, vv
@@ -267,21 +266,18 @@ class Balance {
     return values * fit.importance.asDiagonal() / std::pow(fit.mean, 4);
   }
 
+  // Above those of what conjugate gradients solve.
   VectorXd diagonals() const {
     VectorXd all = VectorXd::Zero(static_cast<Eigen::Index>(fits_.size()));
     for (std::size_t i = 0; i < fits_.size(); ++i) {
       const Quadratic& fit = fits_[i];
-      const double scale = fit.area / std::pow(fit.mean, 4);
-      for (std::size_t k = 0; k < fit.near.size(); ++k) {
-        const auto row = static_cast<Eigen::Index>(k);
-        all[fit.near[k].particle] +=
-            scale * std::pow(fit.importance[row], 2) * (1 - fit.basis.row(row).squaredNorm());
-      }
-      all[static_cast<Eigen::Index>(i)] +=
-          scale *
-          (fit.importance.squaredNorm() - (fit.basis.transpose() * fit.importance).squaredNorm());
+      const VectorXd each =
+          fit.area / std::pow(fit.mean, 4) * fit.importance.array().square().matrix();
+      for (std::size_t k = 0; k < fit.near.size(); ++k)
+        all[fit.near[k].particle] += each[static_cast<Eigen::Index>(k)];
+      all[static_cast<Eigen::Index>(i)] += each.sum();
     }
-    return all.cwiseMax(1e-12 * all.maxCoeff());
+    return all;
   }
 
   // Slopes at the border, by the normals and lengths of the edges there: 0 inside.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <optional>
 #include <set>
 
 #include "server/convert/convert.h"
@@ -24,6 +25,8 @@ constexpr std::array kIntegrators = {IntegratorKind::kVerlet, IntegratorKind::kV
 constexpr std::array kLabTests = {LabTest::kTensile, LabTest::kTensile,    LabTest::kShear,
                                   LabTest::kBending, LabTest::kCantilever, LabTest::kChain,
                                   LabTest::kDrape};
+constexpr std::array<std::optional<Cut>, 6> kLabMeshes = {
+    std::nullopt, std::nullopt, Cut::kRight, Cut::kAlternating, Cut::kEquilateral, Cut::kIrregular};
 constexpr std::array kAccuracies = {Accuracy::kStandard, Accuracy::kDraft, Accuracy::kStandard,
                                     Accuracy::kFine};
 constexpr std::array kPrecisions = {Precision::kSingle, Precision::kSingle, Precision::kDouble};
@@ -355,7 +358,11 @@ LabOrder Reader::lab_order(const v1::RunTestRequest& from) {
   } else {
     missing("textile", "a textile", "textile.");
   }
-  if (from.has_bending()) order.bending = bending(from.bending(), "bending");
+  order.mesh = choice(kLabMeshes, from.mesh(), "mesh");
+  if (from.has_bending())
+    order.bending = bending(from.bending(), "bending");
+  else if (order.mesh)
+    order.bending = Isometric{};
   order.weft = choice(std::array{false, false, true}, from.direction(), "direction");
   order.spacings = {from.spacings_m().begin(), from.spacings_m().end()};
   return order;

@@ -35,6 +35,19 @@ TEST_F(LabCommandTest, WritesTheBendingCurveOfThePapersFigure2) {
   EXPECT_EQ(picture.find("nan"), std::string::npos);
 }
 
+TEST_F(LabCommandTest, PutsMeshesOfTrianglesToEveryTest) {
+  for (const char* mesh : {"right", "alternating", "equilateral", "irregular"}) {
+    const auto answer =
+        ask({"lab", "cantilever", "--textile", "wool_tropical", "--mesh", mesh, "--spacing", "4"});
+    EXPECT_NEAR(answer["values"][0]["found"].get<double>(), 41.5, 0.5) << mesh;
+  }
+  for (const char* test : {"tensile", "shear", "bending", "chain", "drape"}) {
+    const auto answer =
+        ask({"lab", test, "--textile", "wool_tropical", "--mesh", "irregular", "--spacing", "20"});
+    EXPECT_GT(answer["values"][0]["found"].get<double>(), 0) << test;
+  }
+}
+
 TEST_F(LabCommandTest, TakesATextileFromAFile) {
   const std::string file = path("mine.json");
   write_file(file, R"({"measured": {"areal_density_kg_per_m2": 0.2, "shear_n_per_m": 40}})");

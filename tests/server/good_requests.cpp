@@ -187,6 +187,9 @@ std::vector<std::string> known_requests(const std::string& type) {
        "tensile_warp_n_per_m: 100 tensile_weft_n_per_m: 110 shear_n_per_m: 10 "
        "bend_rigidity_warp_n_m: 1e-5 bend_rigidity_weft_n_m: 2e-5 } } "
        "bending { choi_ko { segments: 8 } } direction: LAB_DIRECTION_WEFT spacings_m: 0.01"},
+      {"RunTestRequest",
+       "test: LAB_TEST_TENSILE textile { preset: 'wool_tropical' } bending { isometric {} } "
+       "direction: LAB_DIRECTION_WARP spacings_m: 0.01 mesh: LAB_MESH_IRREGULAR"},
   };
   std::vector<std::string> texts;
   const auto [first, last] = known.equal_range(type);

@@ -262,5 +262,73 @@ TEST(Lab, StifferTextilesThrowALargerShadow) {
   EXPECT_NEAR(before, 100, 0.1);  // a board
 }
 
+class LabOnTriangles : public ::testing::TestWithParam<Cut> {
+ protected:
+  static LabReport run(LabTest test, const std::vector<double>& spacings, bool weft = false,
+                       const MeasuredTextile& textile = wool()) {
+    const LabOrder order{test, textile, Isometric{}, weft, spacings, GetParam()};
+    EXPECT_THAT(find_problems(order), IsEmpty());
+    return run_lab(order);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(, LabOnTriangles,
+                         ::testing::Values(Cut::kRight, Cut::kAlternating, Cut::kEquilateral,
+                                           Cut::kIrregular));
+
+TEST_P(LabOnTriangles, StripsAndFramesMeasureTheirStiffnessWithinOnePercent) {
+  for (const bool weft : {false, true})
+    for (const LabTest test : {LabTest::kTensile, LabTest::kShear}) {
+      const LabReport report = run(test, {0.0125, 0.007}, weft);
+      EXPECT_GE(report.values.size(), 2u);
+      for (const LabValue& value : report.values)
+        EXPECT_NEAR(relative_error(value), 0, 0.01) << value.quantity;
+    }
+}
+
+TEST_P(LabOnTriangles, CylindersMeasureTheRigidityInEveryDirectionWithinOnePercent) {
+  const LabReport report = run(LabTest::kBending, {0.02, 0.01});
+  ASSERT_EQ(report.values.size(), 8u);
+  for (const LabValue& value : report.values)
+    EXPECT_NEAR(relative_error(value), 0, 0.01) << value.quantity;
+}
+
+TEST_P(LabOnTriangles, ACantileverHangsWithinHalfADegreeOfTheStandardFrom1To8Millimetres) {
+  const LabReport report = run(LabTest::kCantilever, {0.001, 0.002, 0.004, 0.0065, 0.008});
+  ASSERT_EQ(report.values.size(), 5u);
+  for (const LabValue& value : report.values) EXPECT_NEAR(value.found, 41.5, 0.5) << value.spacing;
+  EXPECT_GT(report.values.back().spacing, 0.0075);
+  for (const std::string& note : report.notes) ADD_FAILURE() << note;
+}
+
+TEST_P(LabOnTriangles, AChainHangsAsACatenary) {
+  const LabReport report = run(LabTest::kChain, {0.03, 0.0075});
+  EXPECT_LT(std::abs(relative_error(report.values[0])), 0.015);
+  EXPECT_LT(std::abs(relative_error(report.values[1])), 2e-3);
+}
+
+TEST_P(LabOnTriangles, AStiffDiscBendsAsAnAnnularPlateDoes) {
+  constexpr double kRigidity = 0.1, kRadius = 0.15, kHeld = 0.09, kSpacing = 0.0075;
+  MeasuredTextile board = wool();
+  board.bend_rigidity_warp = board.bend_rigidity_weft = kRigidity;
+  const Specimen disc = cut_disc(board, Isometric{}, GetParam(), kRadius, kHeld, kSpacing);
+  const Equilibrium rest =
+      find_equilibrium(disc.mesh, disc.held, {0, -kStandardGravity, 0}, disc.start, 1e-8);
+  ASSERT_TRUE(rest.found);
+  const AnnularPlate plate(kRigidity, board.areal_density * kStandardGravity, kHeld, kRadius);
+  double found = 0, asked = 0;
+  for (Eigen::Index i = 0; i < rest.x.cols(); ++i) {
+    if (disc.held[i] != 0) continue;
+    found -= disc.mesh.mass[i] * rest.x(1, i);
+    asked += disc.mesh.mass[i] * plate.deflection(std::hypot(disc.start(0, i), disc.start(2, i)));
+  }
+  RecordProperty("share", std::to_string(found / asked));
+  EXPECT_NEAR(found / asked, 1, 0.2);  // by where a clamp on particles acts
+}
+
+TEST(Lab, TrianglesBendByTheIsometricLawAlone) {
+  const LabOrder order{LabTest::kTensile, wool(), ChoiKo{}, false, {}, Cut::kRight};
+  EXPECT_THAT(find_problems(order), ElementsAre(Field(&Problem::field, "bending")));
+}
+
 }  // namespace
 }  // namespace weft::testing

@@ -134,6 +134,38 @@ TEST_P(OnEveryMesh, ACylinderStoresTheEnergyOfTheRigidityInEveryDirection) {
   }
 }
 
+// A strip under an even moment: it is the ends that bend it, so nothing pulls at particles away
+// from them, those along its free sides among them.
+TEST_P(OnEveryMesh, AnEvenMomentIsHeldByTheEndsAlone) {
+  constexpr double kSpacing = 0.02, kCurvature = 2;
+  const RestShape shape = cut_rectangle(GetParam(), 0.3, 0.1, kSpacing);
+  const Surface surface = bending_of(shape, kBend);
+  Matrix3Xd x = flat(shape);
+  x.row(1) = kCurvature / 2 * x.row(0).array().square();
+  Matrix3Xd force = Matrix3Xd::Zero(3, x.cols());
+  add_curvature_forces(surface, x, force);
+  const double usual = kBend.warp * kCurvature;  // B kappa h^2 / h^2, N
+  double most = 0, at_ends = 0;
+  for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    const bool inside = x(0, i) > 4 * kSpacing && x(0, i) < 0.3 - 4 * kSpacing;
+    double& largest = inside ? most : at_ends;
+    largest = std::max(largest, std::abs(force(1, i)));
+  }
+  EXPECT_LT(most, 0.06 * usual);
+  EXPECT_GT(at_ends, 0.1 * usual);
+}
+
+TEST_P(OnEveryMesh, NoTriangleIsASliver) {
+  for (const double spacing : {0.04, 0.01})
+    for (const RestShape& shape :
+         {cut_rectangle(GetParam(), 0.4, 0.3, spacing), cut_disc(GetParam(), 0.15, spacing)})
+      for (const MembraneElement& element : make_membrane(shape))
+        for (std::size_t k = 0; k < 3; ++k) {
+          EXPECT_GT(element.area, 0);
+          EXPECT_GT(1 / std::hypot(element.du[k], element.dv[k]), 0.2 * spacing);
+        }
+}
+
 TEST_P(OnEveryMesh, AFlatSheetResistsNoTurnStretchOrShearByBending) {
   const RestShape shape = square(GetParam(), 0.2, 0.04);
   Eigen::Matrix3d any;

@@ -13,4 +13,8 @@ inline RestShape square(Cut cut, double width, double spacing) {
 // valence.
 RestShape scattered(int columns, double spacing);
 
+// The longest Verlet step at which a small disturbance about x does not grow, forces there taken
+// away, by bisection. s
+double measured_step(const Mesh& mesh, const Matrix3Xd& x);
+
 }  // namespace weft::testing

@@ -55,8 +55,9 @@ With --json an error is one line on stderr, and stdout has answers alone:
   {"error": {"code": "INVALID_ARGUMENT", "reason": "FIELD_INVALID",
              "message": "...", "violations": [{"field": "...",
              "description": "..."}]}}
-A field is one of a scene file or a script, an option, or a place in a mesh. code is gRPC's. reason
-is what a program should look at: the server's, such as SESSION_NOT_FOUND,
+A field is one of a scene file or a script, an option, or a place in a mesh.
+code is gRPC's. reason is what a program should look at: the server's, such as
+SESSION_NOT_FOUND,
 FRAME_EXPIRED, STEP_UNSTABLE (proto/weft/v1 names them), or the client's own:
 USAGE, NO_CONNECTION, FILE_UNREADABLE, FILE_UNWRITABLE, FILE_MALFORMED,
 FILE_DAMAGED, SCRIPT_FAILED, INTERRUPTED. Messages may change.

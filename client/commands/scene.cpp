@@ -145,6 +145,13 @@ face the other way, and joins the ends of slivers, triangles lower than a
 quarter of the median, where no border or seam moves; it says what it did.
 )";
 
+void refuse_options_of_templates(const CLI::App& command) {
+  for (const char* option : {"--template", "--rows", "--columns", "--spacing", "--bend",
+                             "--evaluator", "--segments", "--fold-clamp", "--optimal-breakpoints"})
+    if (command.count(option) > 0)
+      throw usage_problem(fmt::format("{} is for templates; --mesh excludes it", option));
+}
+
 void add_mesh_options(CLI::App& command, MeshOptions& options) {
   CLI::Option* mesh =
       command.add_option("--mesh", options.path, "Triangles to start from: .obj, .gltf or .glb")
@@ -222,12 +229,11 @@ void add_new(CLI::App& scene, Context& context) {
                    "One value by its place, such as sheets[0].skin_m=0.003; may be given again")
       ->option_text("FIELD=VALUE ...")
       ->allow_extra_args(false);
-  for (const char* of_templates :
-       {"--template", "--rows", "--columns", "--spacing", "--bend", "--evaluator", "--segments",
-        "--fold-clamp", "--optimal-breakpoints"})
-    command->get_option("--mesh")->excludes(command->get_option(of_templates));
   command->footer(template_list() + kMeshHelp);
-  command->callback([&context, options] { run_new(context, *options); });
+  command->callback([&context, options, command] {
+    if (!options->mesh.path.empty()) refuse_options_of_templates(*command);
+    run_new(context, *options);
+  });
 }
 
 void add_check(CLI::App& scene, Context& context) {

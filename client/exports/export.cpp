@@ -119,7 +119,6 @@ std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& p
 
 ExportResult export_recording(RecordingReader& recording, const ExportOrder& order,
                               const std::function<void(const ExportResult&)>& progress) {
-  const Part part = find_part(recording, order.sheet);
   const std::vector<std::int64_t> numbers = frames_to_export(recording, order);
   if (numbers.empty())
     throw usage_problem(fmt::format("{} has none of these frames", recording.path()));
@@ -128,6 +127,7 @@ ExportResult export_recording(RecordingReader& recording, const ExportOrder& ord
   if (std::filesystem::equivalent(order.path, recording.path(), error))
     throw unwritable(order.path, "it is the recording itself");
   recording.read(numbers.front());  // its particles are as many as the header says, or it throws
+  const Part part = find_part(recording, order.sheet);
   const auto writer = make_writer(order, part, recording, numbers);
   ExportResult result{.frames = 0, .particles = static_cast<std::int64_t>(part.count)};
   for (const std::int64_t number : numbers) {

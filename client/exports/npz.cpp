@@ -115,7 +115,7 @@ class NpzWriter : public FrameWriter {
   // What is said of a file before it, and again at the end: version 2.0, stored, 1 January 1980.
   static std::string facts_of(const Entry& entry) {
     std::string bytes;
-    for (const std::uint64_t value : {20, 0, 0, 0, 33}) put(bytes, 2, value);
+    for (const std::uint64_t value : {20U, 0U, 0U, 0U, 33U}) put(bytes, 2, value);
     put(bytes, 4, entry.checksum);
     put(bytes, 4, entry.size);
     put(bytes, 4, entry.size);

@@ -151,7 +151,7 @@ class Reading {
     const Matrix placed = parent * local(node);
     if (node.mesh >= 0) add_mesh(node.mesh, placed);
     if (node.skin >= 0)
-      mesh_.notes.push_back("its skin is left out: points are where they are bound");
+      mesh_.notes.emplace_back("its skin is left out: points are where they are bound");
     for (const int child : node.children) add_node(child, placed);
   }
 
@@ -224,7 +224,7 @@ class Reading {
   std::size_t add_points(int accessor, const Matrix& placed) {
     const std::size_t before = mesh_.positions.size();
     read(accessor, 3, "POSITION", [&](const Vector3d& value) {
-      mesh_.positions.push_back((placed * value.homogeneous()).head<3>());
+      mesh_.positions.emplace_back((placed * value.homogeneous()).head<3>());
     });
     return mesh_.positions.size() - before;
   }

@@ -91,7 +91,7 @@ bool find_flat_shape(const std::string& path, ImportedMesh& mesh) {
                     "has no UV, and does not lie in a plane: its flat shape is unknown. Unfold it "
                     "where it comes from (in Blender: seams, then UV > Unwrap), and export it with "
                     "UV");
-  mesh.notes.push_back("it has no UV: its flat shape is the plane that it lies in");
+  mesh.notes.emplace_back("it has no UV: its flat shape is the plane that it lies in");
   return false;
 }
 

@@ -173,13 +173,14 @@ class Reading {
   // By the first of g, usemtl and o that tells faces apart.
   void name_panels() {
     int Face::*by = nullptr;
-    for (const auto& [kind, name] :
-         {std::pair(&Face::group, "g"), std::pair(&Face::material, "usemtl"),
-          std::pair(&Face::object, "o")}) {
-      const auto differs = [&](const Face& face) { return face.*kind != faces_[0].*kind; };
+    for (const auto& kind : {std::pair(&Face::group, "g"), std::pair(&Face::material, "usemtl"),
+                             std::pair(&Face::object, "o")}) {
+      const auto differs = [&](const Face& face) {
+        return face.*kind.first != faces_[0].*kind.first;
+      };
       if (by != nullptr || std::none_of(faces_.begin(), faces_.end(), differs)) continue;
-      by = kind;
-      mesh_.panels_by = name;
+      by = kind.first;
+      mesh_.panels_by = kind.second;
     }
     // one panel has the first name that there is
     const Face& first = faces_[0];

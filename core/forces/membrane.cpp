@@ -19,10 +19,11 @@ MembraneStrain strain_of(const Threads& threads) {
           threads.warp.dot(threads.weft)};
 }
 
-MembraneStrain stress(const MembraneStiffness& stiffness, const MembraneStrain& e, bool pushes) {
-  MembraneStrain s{stiffness.warp * e.warp + stiffness.coupling * e.weft,
-                   stiffness.weft * e.weft + stiffness.coupling * e.warp,
-                   stiffness.shear * e.shear};
+MembraneStrain stress(const MembraneStiffness& stiffness, const MembraneStrain& strain,
+                      bool pushes) {
+  MembraneStrain s{stiffness.warp * strain.warp + stiffness.coupling * strain.weft,
+                   stiffness.weft * strain.weft + stiffness.coupling * strain.warp,
+                   stiffness.shear * strain.shear};
   if (!pushes) s.warp = std::max(s.warp, 0.0), s.weft = std::max(s.weft, 0.0);
   return s;
 }

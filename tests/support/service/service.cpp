@@ -255,9 +255,9 @@ std::string metrics_at(const std::string& address) {
 std::vector<const google::protobuf::MethodDescriptor*> all_methods() {
   std::vector<const google::protobuf::MethodDescriptor*> methods;
   for (const auto* file :
-       {v1::Asset::descriptor()->file(), v1::StreamFramesRequest::descriptor()->file(), v1::RunTestRequest::descriptor()->file(),
-        v1::ServerInfo::descriptor()->file(), v1::Session::descriptor()->file(),
-        v1::Textile::descriptor()->file()}) {
+       {v1::Asset::descriptor()->file(), v1::StreamFramesRequest::descriptor()->file(),
+        v1::RunTestRequest::descriptor()->file(), v1::ServerInfo::descriptor()->file(),
+        v1::Session::descriptor()->file(), v1::Textile::descriptor()->file()}) {
     for (int i = 0; i < file->service_count(); ++i) {
       for (int k = 0; k < file->service(i)->method_count(); ++k)
         methods.push_back(file->service(i)->method(k));

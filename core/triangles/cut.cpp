@@ -81,7 +81,7 @@ std::vector<Triangle> lower_hull(std::vector<Vector2d> points, std::vector<doubl
   for (const Vector2d& point : points) reach = std::max(reach, point.norm());
   reach *= 1000;
   for (const Vector2d& far : {Vector2d(-2, -1), Vector2d(2, -1), Vector2d(0, 2)}) {
-    points.push_back(reach * far);
+    points.emplace_back(reach * far);
     height.push_back(points.back().squaredNorm());
   }
   std::vector<Triangle> triangles = {{count, count + 1, count + 2}};

@@ -234,8 +234,8 @@ class Halving {
 
 }  // namespace
 
-std::vector<int> near_order(const std::vector<std::vector<int>>& near) {
-  return Halving(near).order();
+std::vector<int> near_order(const std::vector<std::vector<int>>& neighbours) {
+  return Halving(neighbours).order();
 }
 
 template <class T>

@@ -11,7 +11,7 @@
 namespace weft {
 
 // A mesh that can be simulated, or everything that is wrong with it. Paths begin with `field`.
-Converted<Triangles> to_mesh(const v1::MeshData& mesh, const std::string& field);
+Converted<Triangles> to_mesh(const v1::MeshData& from, const std::string& field);
 
 // Triangles, flat shape and panels of a sheet, without positions.
 v1::MeshData topology_of(const SheetShape& shape);

@@ -150,7 +150,7 @@ grpc::ServerUnaryReactor* AssetService::DeleteAsset(grpc::CallbackServerContext*
       [&backend = backend_, request = *request](const Caller& caller, v1::DeleteAssetResponse&) {
         if (const auto error = refusal_of_asset_name(request.name())) return *error;
         if (backend.draining) return errors::server_draining();
-        const grpc::Status status = erase(backend.store->assets(), caller, request);
+        grpc::Status status = erase(backend.store->assets(), caller, request);
         count_assets(backend);
         return status;
       });

@@ -89,6 +89,13 @@ TEST(GoodScenes, AreShownAsTheyWereGiven) {
   EXPECT_TRUE(differencer.Compare(given, shown)) << differences;
   EXPECT_EQ(service.create(shown).scene().SerializeAsString(), shown.SerializeAsString());
 }
+// Tests of refused and left calls run on for a while.
+ServerOptions with_room_for_tests() {
+  ServerOptions options = Service::in_process();
+  options.limits.max_tests = 1000;
+  return options;
+}
+
 // A server with the session that requests speak of.
 class Subject {
  public:
@@ -139,7 +146,7 @@ class Subject {
     before_ = service_.get(session_).SerializeAsString();
   }
 
-  Service service_;
+  Service service_{with_room_for_tests()};
   v1::Session session_;
   std::string before_;
 };

@@ -16,6 +16,11 @@ template <class T>
 class AlignedArray {
  public:
   AlignedArray() = default;
+  AlignedArray(AlignedArray&&) noexcept = default;
+  AlignedArray& operator=(AlignedArray&&) noexcept = default;
+  AlignedArray(const AlignedArray&) = delete;
+  AlignedArray& operator=(const AlignedArray&) = delete;
+  ~AlignedArray();  // not in the class: clang 14 then leaves it out of units that need it
   explicit AlignedArray(std::size_t size)
       : data_(static_cast<T*>(allocate_aligned(size * sizeof(T)))), size_(size) {
     std::memset(static_cast<void*>(data_.get()), 0, size * sizeof(T));
@@ -26,15 +31,13 @@ class AlignedArray {
 
  private:
   struct Free {
-    void operator()(T* data) const;
+    void operator()(T* data) const { std::free(data); }
   };
   std::unique_ptr<T[], Free> data_;
   std::size_t size_ = 0;
 };
 
 template <class T>
-void AlignedArray<T>::Free::operator()(T* data) const {
-  std::free(data);
-}
+AlignedArray<T>::~AlignedArray() = default;
 
 }  // namespace weft

@@ -67,7 +67,7 @@ class Assets {
   bool own(const std::string& hash, const std::string& owner, Time now);
 
   // A piece, by its number; empty behind the last.
-  std::string piece(const KeptAsset& asset, std::int64_t number);
+  std::string piece(const KeptAsset& asset, std::int64_t at);
   // All of them.
   std::string bytes(const KeptAsset& asset);
 

@@ -2,8 +2,11 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "core/forces/curvature.h"
 #include "core/forces/elastic.h"
@@ -22,42 +25,6 @@ struct Block {
   double along, across;
 };
 
-// Second derivatives of a triangle's energy: of its strains, and of its threads under stress.
-struct MembraneTangent {
-  const MembraneElement& element;
-  MembraneStiffness stiffness;
-  Threads threads;
-  MembraneStrain stress;
-
-  // Adds `share` of it times y to out.
-  void add(double share, const Matrix3Xd& y, Matrix3Xd& out) const {
-    const Threads moved = threads_of(element, y);
-    const MembraneStrain strain{threads.warp.dot(moved.warp), threads.weft.dot(moved.weft),
-                                threads.warp.dot(moved.weft) + threads.weft.dot(moved.warp)};
-    const MembraneStrain changed = weft::stress(stiffness, strain, true);
-    const Vector3d warp = changed.warp * threads.warp + changed.shear * threads.weft +
-                          stress.warp * moved.warp + stress.shear * moved.weft;
-    const Vector3d weft = changed.weft * threads.weft + changed.shear * threads.warp +
-                          stress.weft * moved.weft + stress.shear * moved.warp;
-    for (std::size_t k = 0; k < 3; ++k)
-      out.col(element.particle[k]) +=
-          share * element.area * (element.du[k] * warp + element.dv[k] * weft);
-  }
-};
-
-MembraneTangent tangent_of(const Surface& surface, const MembraneElement& element,
-                           const Matrix3Xd& x) {
-  MembraneTangent tangent{element,
-                          surface.stretch[static_cast<std::size_t>(element.panel)],
-                          threads_of(element, x),
-                          {}};
-  const MembraneStrain strain = strain_of(tangent.threads);
-  tangent.stress = stress(tangent.stiffness, strain, surface.pushes);
-  if (!surface.pushes && strain.warp < 0) tangent.stiffness.warp = 0;
-  if (!surface.pushes && strain.weft < 0) tangent.stiffness.weft = 0;
-  return tangent;
-}
-
 // a K + b C over vectors of (D x particles), scaled by 1/sqrt(mass) on both sides. One dimension
 // serves the graph Laplacian, three the Jacobian.
 template <int D>
@@ -70,8 +37,6 @@ class Operator {
       : mesh_(mesh), scale_(inverse_mass.cwiseSqrt()), damping_(damping), air_rate_(air_rate) {}
 
   void add(const Block& block) { blocks_.push_back(block); }
-  // Of the membrane at a shape.
-  void add(const MembraneTangent& tangent) { tangents_.push_back(tangent); }
   void set_factors(double stiffness, double damping) { a_ = stiffness, b_ = damping; }
   Eigen::Index size() const { return scale_.size() * D; }
 
@@ -93,10 +58,6 @@ class Operator {
       sum *= a_ * stencil.stiffness;
       for (std::size_t k = 0; k < 4; ++k) out.col(stencil.particle[k]) += stencil.weight[k] * sum;
     }
-    if constexpr (D == 3)
-      for (const MembraneTangent& tangent : tangents_) tangent.add(a_, y, out);
-    if (a_ != 0)
-      for (const CurvatureFit& fit : mesh_.surface.fits) add(fit, y, out);
     for (Eigen::Index i = 0; i < scale_.size(); ++i) {
       out.col(i) *= scale_[i];
       if (scale_[i] > 0) out.col(i) += b_ * air_rate_ * given.col(i);
@@ -105,27 +66,155 @@ class Operator {
   }
 
  private:
-  void add(const CurvatureFit& fit, const Points& y, Points& out) const {
-    Eigen::Matrix<double, D, 3> sum = Eigen::Matrix<double, D, 3>::Zero();
-    const auto weight = [&](std::size_t k) { return Vector3d::Map(fit.weight[k].data()); };
-    for (std::size_t k = 0; k < fit.particle.size(); ++k)
-      sum += y.col(fit.particle[k]) * weight(k).transpose();
-    sum *= (a_ * fit_stiffness(mesh_.surface, fit)).asDiagonal();
-    for (std::size_t k = 0; k < fit.particle.size(); ++k)
-      out.col(fit.particle[k]) += sum * weight(k);
-  }
-
   const Mesh& mesh_;
   VectorXd scale_;
   double damping_, air_rate_;
   double a_ = 1, b_ = 0;
   std::vector<Block> blocks_;
-  std::vector<MembraneTangent> tangents_;
+};
+
+// The same of triangles at a shape x. In single precision, which bears more digits than are asked
+// of its largest eigenvalue.
+class SurfaceOperator {
+ public:
+  SurfaceOperator(const Mesh& mesh, const VectorXd& inverse_mass, double air_rate,
+                  const Matrix3Xd& x)
+      : mesh_(mesh), scale_(inverse_mass.cwiseSqrt().cast<float>()), air_rate_(air_rate) {
+    const Surface& surface = mesh.surface;
+    tangents_.reserve(surface.membrane.size());
+    for (const MembraneElement& element : surface.membrane)
+      tangents_.push_back(tangent_of(surface, element, x));
+    for (const CurvatureFit& fit : surface.fits) {
+      const Vector3d root = fit_stiffness(surface, fit).cwiseSqrt();
+      fits_.push_back(static_cast<int>(fit.particle.size()));
+      for (std::size_t k = 0; k < fit.particle.size(); ++k)
+        weights_.push_back({fit.particle[k],
+                            Vector3d::Map(fit.weight[k].data()).cwiseProduct(root).cast<float>()});
+    }
+  }
+
+  // Precondition: stiffness > 0.
+  void set_factors(double stiffness, double damping) { a_ = stiffness, b_ = damping; }
+  Eigen::Index size() const { return 3 * scale_.size(); }
+
+  VectorXd operator()(const VectorXd& in) const {
+    const Eigen::Map<const Matrix3Xd> given(in.data(), 3, scale_.size());
+    Points y = Points::Zero(4, scale_.size()), pull = y;  // pull: over a
+    y.topRows<3>() = given.cast<float>() * scale_.asDiagonal();
+    for (const Tangent& tangent : tangents_) add(tangent, y, pull);
+    const Weight* weight = weights_.data();
+    for (const int count : fits_) add(std::exchange(weight, weight + count), count, y, pull);
+    const auto damping = static_cast<float>(b_ * mesh_.damping / a_);
+    for (const Family& family : mesh_.families) {
+      if (damping == 0) break;
+      for (const auto& [i, j] : family.connections) {
+        const Point pulled = damping * (y.col(i) - y.col(j));
+        pull.col(i) += pulled;
+        pull.col(j) -= pulled;
+      }
+    }
+    Matrix3Xd out = a_ * (pull.topRows<3>().cast<double>() * scale_.cast<double>().asDiagonal());
+    for (Eigen::Index i = 0; i < scale_.size(); ++i)
+      if (scale_[i] > 0) out.col(i) += b_ * air_rate_ * given.col(i);
+    return out.reshaped();
+  }
+
+ private:
+  using Point = Eigen::Vector4f;  // x, y, z and 0
+  using Points = Eigen::Matrix4Xf;
+  // Second derivatives of a triangle's energy: of its strains, and of its threads under stress.
+  struct Tangent {
+    Point warp, weft;  // threads
+    std::array<int, 3> particle;
+    std::array<float, 3> du, dv;               // 1/m
+    float along_warp, along_weft;              // stiffness times area, N m
+    float coupling, shear;                     // N m
+    float warp_stress, weft_stress, shearing;  // times area, N m
+  };
+  // What a fit weighs a particle by, times the root of its stiffness.
+  struct Weight {
+    int particle;
+    Eigen::Vector3f uu_uv_vv;
+  };
+
+  static Point point(const Vector3d& v) {
+    return {static_cast<float>(v.x()), static_cast<float>(v.y()), static_cast<float>(v.z()), 0};
+  }
+
+  static Tangent tangent_of(const Surface& surface, const MembraneElement& element,
+                            const Matrix3Xd& x) {
+    MembraneStiffness stiffness = surface.stretch[static_cast<std::size_t>(element.panel)];
+    const Threads threads = threads_of(element, x);
+    const MembraneStrain strain = strain_of(threads);
+    const MembraneStrain under = stress(stiffness, strain, surface.pushes);
+    if (!surface.pushes && strain.warp < 0) stiffness.warp = 0;
+    if (!surface.pushes && strain.weft < 0) stiffness.weft = 0;
+    const auto times_area = [&](double value) { return static_cast<float>(element.area * value); };
+    Tangent tangent{point(threads.warp),
+                    point(threads.weft),
+                    element.particle,
+                    {},
+                    {},
+                    times_area(stiffness.warp),
+                    times_area(stiffness.weft),
+                    times_area(stiffness.coupling),
+                    times_area(stiffness.shear),
+                    times_area(under.warp),
+                    times_area(under.weft),
+                    times_area(under.shear)};
+    for (std::size_t k = 0; k < 3; ++k) {
+      tangent.du[k] = static_cast<float>(element.du[k]);
+      tangent.dv[k] = static_cast<float>(element.dv[k]);
+    }
+    return tangent;
+  }
+
+  static void add(const Tangent& tangent, const Points& y, Points& out) {
+    Point warp = Point::Zero(), weft = warp;  // how threads move
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Point at = y.col(tangent.particle[k]);
+      warp += tangent.du[k] * at;
+      weft += tangent.dv[k] * at;
+    }
+    const float along_warp = tangent.warp.dot(warp), along_weft = tangent.weft.dot(weft);
+    const float sheared = tangent.shear * (tangent.warp.dot(weft) + tangent.weft.dot(warp));
+    const Point pull_warp =
+        (tangent.along_warp * along_warp + tangent.coupling * along_weft) * tangent.warp +
+        sheared * tangent.weft + tangent.warp_stress * warp + tangent.shearing * weft;
+    const Point pull_weft =
+        (tangent.along_weft * along_weft + tangent.coupling * along_warp) * tangent.weft +
+        sheared * tangent.warp + tangent.weft_stress * weft + tangent.shearing * warp;
+    for (std::size_t k = 0; k < 3; ++k)
+      out.col(tangent.particle[k]) += tangent.du[k] * pull_warp + tangent.dv[k] * pull_weft;
+  }
+
+  static void add(const Weight* weights, int count, const Points& y, Points& out) {
+    Point uu = Point::Zero(), uv = uu, vv = uu;
+    for (int k = 0; k < count; ++k) {
+      const auto& [particle, weight] = weights[k];
+      const Point at = y.col(particle);
+      uu += weight[0] * at;
+      uv += weight[1] * at;
+      vv += weight[2] * at;
+    }
+    for (int k = 0; k < count; ++k) {
+      const auto& [particle, weight] = weights[k];
+      out.col(particle) += weight[0] * uu + weight[1] * uv + weight[2] * vv;
+    }
+  }
+
+  const Mesh& mesh_;
+  Eigen::VectorXf scale_;
+  double air_rate_;
+  double a_ = 1, b_ = 0;
+  std::vector<Tangent> tangents_;
+  std::vector<int> fits_;  // particles of each
+  std::vector<Weight> weights_;
 };
 
 // Largest eigenvalue by Lanczos' method, from a fixed start, up to where it stops growing.
-template <int D>
-double largest_eigenvalue(const Operator<D>& matrix) {
+template <class Matrix>
+double largest_eigenvalue(const Matrix& matrix) {
   constexpr int kMost = 120, kCheckEvery = 8;
   constexpr double kTolerance = 1e-4;
   const Eigen::Index n = matrix.size();
@@ -157,15 +246,16 @@ double largest_eigenvalue(const Operator<D>& matrix) {
       if (done || change <= kTolerance * found) break;
     }
     off.push_back(beta);
-    before = q;
+    before.swap(q);
     q = next / beta;
   }
   return std::max(0.0, largest);
 }
 
-// The dt at which the largest eigenvalue of dt^2 K + 4 dt C reaches 4.
-template <int D>
-double verlet_step(Operator<D>& matrix, double stiffness, double damping) {
+// The dt at which the largest eigenvalue of dt^2 K + 4 dt C reaches 4, from those apart, or bounds
+// of them. What is left of a last change is of its second order.
+template <class Matrix>
+double verlet_step(Matrix& matrix, double stiffness, double damping, double last_change) {
   if (stiffness <= 0 && damping <= 0) return kInfinity;
   // by the largest eigenvalues apart, then refined: on a log scale the root is nearly linear
   double dt = 2 / (damping + std::sqrt(damping * damping + stiffness));
@@ -176,7 +266,7 @@ double verlet_step(Operator<D>& matrix, double stiffness, double damping) {
     const double share = 4 * dt * damping / (4 * dt * damping + dt * dt * stiffness);
     const double factor = std::pow(4 / value, 1 / (2 - share));
     dt *= factor;
-    if (std::abs(factor - 1) < 1e-4) break;
+    if (std::abs(factor - 1) < last_change) break;
   }
   return dt;
 }
@@ -200,7 +290,7 @@ double velocity_step(IntegratorKind kind, double stiffness, double damping, doub
 template <int D>
 double limit(IntegratorKind kind, Operator<D>& matrix, double stiffness, double damping,
              double ratio) {
-  return kind == IntegratorKind::kVerlet ? verlet_step(matrix, stiffness, damping)
+  return kind == IntegratorKind::kVerlet ? verlet_step(matrix, stiffness, damping, 1e-4)
                                          : velocity_step(kind, stiffness, damping, ratio);
 }
 
@@ -234,8 +324,8 @@ Operator<1> graph_of(const Mesh& mesh, const VectorXd& inverse_mass, double damp
 }
 
 // Of stiffness K + damping C.
-template <int D>
-double eigenvalue(Operator<D>& matrix, double stiffness, double damping) {
+template <class Matrix>
+double eigenvalue(Matrix& matrix, double stiffness, double damping) {
   matrix.set_factors(stiffness, damping);
   return largest_eigenvalue(matrix);
 }
@@ -294,19 +384,13 @@ StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrat
     step.limiting_particle = static_cast<int>(i);
   }
 
-  Operator<3> jacobian(mesh, inverse_mass, mesh.damping, air_rate);
-  for (const MembraneElement& element : mesh.surface.membrane)
-    jacobian.add(tangent_of(mesh.surface, element, x));
+  SurfaceOperator jacobian(mesh, inverse_mass, air_rate, x);
   const double stiffness = eigenvalue(jacobian, 1, 0);
   step.estimate = limit(integrator, stiffness, gamma);
   // only where damping counts do both have to be seen together
-  constexpr double kCounts = 0.005;
-  if (integrator == IntegratorKind::kVerlet && step.estimate * gamma > kCounts) {
-    for (const Family& family : mesh.families)
-      for (const Connection& connection : family.connections)
-        jacobian.add(jacobian_block(family, connection, x));
-    step.estimate = verlet_step(jacobian, stiffness, eigenvalue(jacobian, 0, 1));
-  }
+  constexpr double kCounts = 0.005, kLastChange = 0.02;
+  if (integrator == IntegratorKind::kVerlet && step.estimate * gamma > kCounts)
+    step.estimate = verlet_step(jacobian, stiffness, gamma, kLastChange);
   const Rates unstrained = largest_rates(mesh, inverse_mass, mesh.damping, 0);
   step.connection_ratio = unstrained.damping_ratio();
   step.damping_ratio = std::isinf(step.connection_ratio) ? 0 : step.connection_ratio;

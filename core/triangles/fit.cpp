@@ -2,6 +2,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 
@@ -186,6 +187,86 @@ Quadratic quadratic(std::vector<Neighbour> near) {
   return fit;
 }
 
+// What no quadratic has of values around each particle, scattered back: the matrix of Balance. It
+// is solved for a few digits, which single precision has.
+class FreeParts {
+ public:
+  explicit FreeParts(const std::vector<Quadratic>& fits) {
+    std::size_t members = 0;
+    for (const Quadratic& fit : fits) members += fit.near.size();
+    members_.reserve(members);
+    counts_.reserve(fits.size());
+    for (const Quadratic& fit : fits) {
+      counts_.push_back(fit.near.size());
+      const double scale = std::sqrt(fit.area) / (fit.mean * fit.mean);
+      for (std::size_t k = 0; k < fit.near.size(); ++k) {
+        const auto row = static_cast<Eigen::Index>(k);
+        const double root = scale * fit.importance[row];
+        Member& member = members_.emplace_back();
+        member.particle = fit.near[k].particle;
+        member.weight = static_cast<float>(root * root);
+        for (Eigen::Index q = 0; q < fit.basis.cols(); ++q)
+          member.basis[static_cast<std::size_t>(q)] = static_cast<float>(root * fit.basis(row, q));
+        if (fit.near[k].turn == Plane2(1)) continue;
+        member.turned = static_cast<int>(turns_.size());
+        turns_.push_back(into(fit.near[k].turn).cast<float>());
+        turns_.push_back(into(std::conj(fit.near[k].turn)).cast<float>());
+      }
+    }
+  }
+
+  // Adds what they are of `values` to sums, by particle.
+  void add(const Matrix3Xd& values, Matrix3Xd& sums) const {
+    Eigen::Matrix4Xf from = Eigen::Matrix4Xf::Zero(4, values.cols()), to = from;
+    from.topRows<3>() = values.cast<float>();
+    std::vector<Tensor> around;
+    const Member* member = members_.data();
+    for (std::size_t i = 0; i < counts_.size(); member += counts_[i], ++i) {
+      const auto own = static_cast<Eigen::Index>(i);
+      around.resize(std::max(around.size(), counts_[i]));
+      std::array<Tensor, 5> quadratics;
+      quadratics.fill(Tensor::Zero());
+      for (std::size_t k = 0; k < counts_[i]; ++k) {
+        const Member& each = member[k];
+        Tensor value = from.col(each.particle);
+        if (each.turned >= 0) turn(each.turned + 1, value);
+        value -= from.col(own);
+        for (std::size_t q = 0; q < 5; ++q) quadratics[q] += each.basis[q] * value;
+        around[k] = value;
+      }
+      Tensor sum = Tensor::Zero();
+      for (std::size_t k = 0; k < counts_[i]; ++k) {
+        const Member& each = member[k];
+        Tensor part = each.weight * around[k];
+        for (std::size_t q = 0; q < 5; ++q) part -= each.basis[q] * quadratics[q];
+        sum += part;
+        if (each.turned >= 0) turn(each.turned, part);
+        to.col(each.particle) += part;
+      }
+      to.col(own) -= sum;
+    }
+    sums += to.topRows<3>().cast<double>();
+  }
+
+ private:
+  using Tensor = Eigen::Vector4f;  // uu, uv, vv and 0
+  struct Member {
+    int particle;
+    int turned = -1;  // at which of the turns, into the particle's own frame; the next leads back
+    float weight;
+    std::array<float, 5> basis{};
+  };
+
+  void turn(int by, Tensor& tensor) const {
+    const Eigen::Vector3f turned = turns_[static_cast<std::size_t>(by)] * tensor.head<3>();
+    tensor.head<3>() = turned;
+  }
+
+  std::vector<std::size_t> counts_;  // of each particle's members
+  std::vector<Member> members_;
+  std::vector<Eigen::Matrix3f> turns_;
+};
+
 // Fits are right about a sheet that is bent evenly, and still it would not keep that shape under an
 // even moment where the mesh is uneven: it would find one of less energy, and be too limp. It keeps
 // it where the mean curvature of all depends on the slopes at the border alone, as in the plane the
@@ -201,24 +282,26 @@ class Balance {
     Matrix3Xd residual = border_slopes();
     for (std::size_t i = 0; i < fits_.size(); ++i)
       scatter(i, -fits_[i].area * fits_[i].weights, residual);
-    const double enough = kEnough * kEnough * product(area_weights(), area_weights());
+    const Matrix3Xd weights = area_weights();
+    const double enough = kEnough * kEnough * product(weights, weights);
     const VectorXd diagonal = diagonals();
-    Matrix3Xd multiplier = Matrix3Xd::Zero(3, residual.cols()), along = multiplier;
+    const FreeParts free_parts(fits_);
+    Matrix3Xd multiplier = Matrix3Xd::Zero(3, residual.cols());
+    Matrix3Xd along = multiplier, scaled = multiplier, sums = multiplier;
     double before = 0;
     for (int k = 0; k < kMost && product(residual, residual) > enough; ++k) {
-      const Matrix3Xd scaled = residual * diagonal.cwiseInverse().asDiagonal();
+      scaled = residual * diagonal.cwiseInverse().asDiagonal();
       const double now = product(residual, scaled);
-      along = before > 0 ? Matrix3Xd(scaled + now / before * along) : scaled;
+      along *= before > 0 ? now / before : 0;
+      along += scaled;
       before = now;
-      Matrix3Xd sums = Matrix3Xd::Zero(3, residual.cols());
-      for (std::size_t i = 0; i < fits_.size(); ++i)
-        scatter(i, fits_[i].area * added(i, along), sums);
-      sums += along * (kSlight * diagonal).asDiagonal();
+      sums = along * (kSlight * diagonal).asDiagonal();
+      free_parts.add(along, sums);
       const double step = now / product(along, sums);
       multiplier += step * along;
       residual -= step * sums;
     }
-    for (std::size_t i = 0; i < fits_.size(); ++i) fits_[i].weights += added(i, multiplier);
+    for (std::size_t i = 0; i < fits_.size(); ++i) fits_[i].weights += free_part(i, multiplier);
   }
 
  private:
@@ -250,8 +333,8 @@ class Balance {
     sums.col(static_cast<Eigen::Index>(i)) -= weights.rowwise().sum();
   }
 
-  // The part of the multipliers around a particle that no quadratic has, 1/m^2 (3 x near).
-  Matrix3Xd added(std::size_t i, const Matrix3Xd& multiplier) const {
+  // The part of the multipliers around a particle that no quadratic has (3 x near).
+  Matrix3Xd free_part(std::size_t i, const Matrix3Xd& multiplier) const {
     const Quadratic& fit = fits_[i];
     Matrix3Xd values(3, fit.importance.size());
     for (std::size_t k = 0; k < fit.near.size(); ++k) {

@@ -269,9 +269,9 @@ void warn_of_damping(const Scene& scene, const std::vector<PlannedSheet>& planne
               " kg/s, a ratio of ", ratio, ", which costs less than 1 % of the step")});
     return;
   }
+  if (scene.solver.integrator != IntegratorKind::kVerlet || safe_share(ratio) == 1) return;
   const double safe = share_of(scene.solver, stable) * stable.linear_bound;
   const double enough = damping_for(mesh, kSafeDampingRatio);
-  if (scene.solver.integrator != IntegratorKind::kVerlet || safe_share(ratio) == 1) return;
   if (const auto& asked = scene.solver.substep; asked && *asked > safe * (1 + 1e-9))
     plan.warnings.push_back(
         {"UNDERDAMPED", field,

@@ -88,10 +88,14 @@ Vector2d largest_size(const TriangleMesh& mesh) {
 }  // namespace
 
 Triangles complete(TriangleMesh mesh) {
-  if (mesh.flat.empty() && mesh.flat_triangles.empty())
+  if (mesh.flat.empty() && mesh.flat_triangles.empty()) {
+    mesh.flat.reserve(mesh.start.size());
     for (const Vector3d& x : mesh.start) mesh.flat.emplace_back(x.z(), x.x());
-  if (mesh.start.empty() && mesh.flat_triangles.empty())
+  }
+  if (mesh.start.empty() && mesh.flat_triangles.empty()) {
+    mesh.start.reserve(mesh.flat.size());
     for (const Vector2d& corner : mesh.flat) mesh.start.emplace_back(corner.y(), 0, corner.x());
+  }
   if (mesh.panels.empty())
     mesh.panels.push_back({"panel", static_cast<int>(mesh.triangles.size()), 0});
   if (is_sound(mesh)) {

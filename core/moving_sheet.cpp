@@ -1,6 +1,7 @@
 #include "core/moving_sheet.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/forces/air.h"
 #include "core/forces/elastic.h"
@@ -9,16 +10,37 @@
 namespace weft {
 
 void MovingSheet::set_definition(const Scene& scene, const SheetDefinition& definition) {
-  mesh = make_mesh(definition);
+  Mesh made = make_mesh(definition);
   if (const auto& ratio = definition.textile.damping_ratio)
-    mesh.damping = damping_for(mesh, *ratio);
+    made.damping = damping_for(made, *ratio);
   else if (!definition.textile.damping)
-    mesh.damping = std::max(kDefaultDamping, damping_for(mesh, kSafeDampingRatio));
+    made.damping = std::max(kDefaultDamping, damping_for(made, kSafeDampingRatio));
+  set_mesh(scene, definition, std::move(made));
+  dynamics.gravity = scene.environment.gravity;
+  skin = definition.skin_or_default();
+}
+
+void MovingSheet::set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made) {
+  mesh = std::move(made);
   if (!scene.environment.wind) mesh.triangles = std::vector<std::array<int, 3>>();
   set_pins(definition.pins);
   dynamics.drag = mesh.drag;
-  dynamics.gravity = scene.environment.gravity;
-  skin = definition.skin_or_default();
+}
+
+void MovingSheet::release_memory() {
+  good_ = {};
+  const double damping = mesh.damping;
+  mesh = {};
+  mesh.damping = damping;
+  dynamics.inverse_mass = dynamics.drag = VectorXd();
+  solver->release_memory();
+}
+
+void MovingSheet::restore_memory(const Scene& scene, const SheetDefinition& definition) {
+  Mesh made = make_mesh(definition);
+  made.damping = mesh.damping;  // costs more to find than all else
+  set_mesh(scene, definition, std::move(made));
+  solver->restore_memory();
 }
 
 void MovingSheet::set_pins(const std::vector<Pin>& pins) {

@@ -25,6 +25,10 @@ struct MovingSheet {
 
   // Mesh, forces and skin of a definition: its textile as it is simulated, and its pins.
   void set_definition(const Scene& scene, const SheetDefinition& definition);
+  // Lets go of what follows from the definition, but for its damping, until it is restored by the
+  // same.
+  void release_memory();
+  void restore_memory(const Scene& scene, const SheetDefinition& definition);
   void set_pins(const std::vector<Pin>& pins);
   // What the mesh or the scene lacks is not there to be computed. Holds on to both.
   void bind_forces(const Scene& scene);
@@ -36,7 +40,6 @@ struct MovingSheet {
   }
   void read_good() { read(good_); }
   void set_good(SheetState& state) { std::swap(good_, state); }
-  void forget_good() { good_ = {}; }
 
   void read(SheetState& state) const {
     solver->positions(state.x);
@@ -45,6 +48,8 @@ struct MovingSheet {
   }
 
  private:
+  void set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made);
+
   mutable SheetState good_;  // empty: not looked at since
 };
 

@@ -228,6 +228,20 @@ int Simulation::State::particle_count() const {
   return count;
 }
 
+void Simulation::State::release_memory() {
+  // solvers are beyond the last good frame
+  if (!failure.empty() || unfinished) return;
+  for (MovingSheet& sheet : sheets) sheet.release_memory();
+  released = true;
+}
+
+// Before anything but the scene, the plan and counts is looked at.
+void Simulation::State::restore_memory() {
+  if (!released) return;
+  for (std::size_t s = 0; s < sheets.size(); ++s) sheets[s].restore_memory(scene, capped(s));
+  released = false;
+}
+
 // x: positions of each sheet.
 Plan Simulation::State::plan_for(const std::vector<Matrix3Xd>& x) const {
   std::vector<VectorXd> inverse_mass;
@@ -278,7 +292,9 @@ FramePart Simulation::advance_frame(const Enough& enough, ThreadPool& pool) {
     ++state.frame;
     return FramePart::kDone;
   }
-  return state.failure.empty() ? state.advance_frame(enough, pool) : FramePart::kFailed;
+  if (!state.failure.empty()) return FramePart::kFailed;
+  state.restore_memory();
+  return state.advance_frame(enough, pool);
 }
 
 double Simulation::frame_share() const {
@@ -297,14 +313,7 @@ bool Simulation::drop_frame() {
   return true;
 }
 
-void Simulation::release_memory() {
-  // solvers are beyond the last good frame
-  if (!state_->failure.empty() || state_->unfinished) return;
-  for (MovingSheet& sheet : state_->sheets) {
-    sheet.forget_good();
-    sheet.solver->release_memory();
-  }
-}
+void Simulation::release_memory() { state_->release_memory(); }
 
 int Simulation::most_threads() const {
   int most = 1;
@@ -332,6 +341,7 @@ void copy_planes(const Matrix3Xd& from, Eigen::Index first, std::span<double> ou
 }  // namespace
 
 void Simulation::copy_positions(std::span<double> out) const {
+  state_->restore_memory();
   Eigen::Index first = 0;
   for (const MovingSheet& sheet : state_->sheets) {
     copy_planes(sheet.good().x, first, out);
@@ -340,6 +350,7 @@ void Simulation::copy_positions(std::span<double> out) const {
 }
 
 void Simulation::copy_velocities(std::span<double> out) const {
+  state_->restore_memory();
   Eigen::Index first = 0;
   for (const MovingSheet& sheet : state_->sheets) {
     copy_planes(sheet.good().v, first, out);
@@ -348,6 +359,7 @@ void Simulation::copy_velocities(std::span<double> out) const {
 }
 
 FrameStats Simulation::stats() const {
+  state_->restore_memory();
   FrameStats stats;
   for (const MovingSheet& sheet : state_->sheets) {
     const Matrix3Xd& x = sheet.good().x;

@@ -62,8 +62,8 @@ class Simulation {
   [[nodiscard]] bool drop_frame();
   // More than these have nothing to do in a pool.
   int most_threads() const;
-  // Lets go of half of its memory, until the next call that needs it: for a while without frames.
-  // Changes nothing else.
+  // Lets go of what its scene and the motion are enough to make again, until the next call that
+  // needs it, which then takes longer: for a while without frames. Changes nothing else.
   void release_memory();
   // All so far.
   const std::vector<Repair>& repairs() const;

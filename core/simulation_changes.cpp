@@ -97,6 +97,7 @@ bool Simulation::State::change_textiles() {
 std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Textile& textile,
                                                    double duration) {
   State& state = *state_;
+  state.restore_memory();
   MovingSheet& sheet = state.sheets[index];
   const Textile now = state.scene.sheets[index].textile;
   if (!sheet.ramp && textile == now) return std::nullopt;
@@ -149,12 +150,14 @@ ActionContext Simulation::State::action_context() const {
 Constraints Simulation::constraints() const { return state_->constraints(); }
 
 std::vector<Problem> Simulation::problems_of(const std::vector<Action>& actions) const {
+  state_->restore_memory();
   Constraints after = constraints();
   return apply(actions, state_->action_context(), after);
 }
 
 std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
   State& state = *state_;
+  state.restore_memory();
   const Constraints before = constraints();
   Constraints after = before;
   [[maybe_unused]] const auto problems = apply(actions, state.action_context(), after);

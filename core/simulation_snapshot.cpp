@@ -4,7 +4,10 @@
 
 namespace weft {
 
-Snapshot Simulation::snapshot() const { return state_->snapshot(); }
+Snapshot Simulation::snapshot() const {
+  state_->restore_memory();
+  return state_->snapshot();
+}
 
 Snapshot Simulation::State::snapshot() const {
   assert(failure.empty() && !unfinished);

@@ -43,10 +43,13 @@ struct Simulation::State {
   bool textile_changed = false;
   std::string failure;
   std::optional<UnfinishedFrame> unfinished;
+  bool released = false;  // what follows from the scene, see Simulation::release_memory()
 
   State(Scene given, SolverFactory factory);
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
   int particle_count() const;
+  void release_memory();
+  void restore_memory();
   SheetDefinition capped(std::size_t sheet) const;
   SheetDefinition simulated(std::size_t sheet) const;
   VectorXd planned_inverse_mass(std::size_t sheet) const;

@@ -27,8 +27,10 @@ class SheetSolver {
 
   // More than these have nothing to do in a pool.
   virtual int most_threads() const { return 1; }
-  // Lets go of memory that only steps need, until the next one.
+  // Lets go of memory that only steps need, or that follows from mesh and dynamics. Until that is
+  // restored no step is taken, and no state asked for.
   virtual void release_memory() {}
+  virtual void restore_memory() {}
 
   // Present state: m, m/s.
   virtual void positions(Matrix3Xd& x) const = 0;

@@ -25,7 +25,9 @@ class TriangleSolver : public SheetSolver {
         state_(particles_, compensated),
         gap_(law_.blocks.size()) {
     law_.compensated = compensated;
+    law_.drags = dynamics.drag.size() > 0;
     if (wind) law_.wind = make_wind_law<T>(*wind);
+    state_.prepare(law_);
   }
 
   void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
@@ -36,7 +38,6 @@ class TriangleSolver : public SheetSolver {
       origin_ /= particles_;
     }
     set_step();
-    complete();
     // half a kick: x(-dt) = x - v dt + a dt^2 / 2
     Matrix3Xd a;
     accelerate(dynamics_, time, x, v, a);
@@ -44,16 +45,12 @@ class TriangleSolver : public SheetSolver {
       set(state_.x, state_.x_error, i, x.col(i) - origin_);
       set(state_.d, state_.d_error, i, v.col(i) * dt - a.col(i) * (dt * dt / 2));
       put(state_.w, i, v.col(i) * (2 * dt));
-      put(state_.step2, i, Vector3d::Constant(dynamics_.inverse_mass[i] * dt * dt));
-      if (law_.drags)
-        put(state_.drag, i, Vector3d::Constant(dynamics_.drag[i] * dynamics_.inverse_mass[i] * dt));
     }
     std::fill(gap_.begin(), gap_.end(), 0);
     least_gap_ = come_ = 0;
   }
 
   void advance(double time, ThreadPool& pool) override {
-    complete();
     const Vector3d air =
         law_.drags || law_.wind.blows ? dynamics_.air(time) : Vector3d(Vector3d::Zero());
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -110,10 +107,15 @@ class TriangleSolver : public SheetSolver {
     return std::max(1, particles_ / kParticles);
   }
 
-  // The law is made again from the mesh.
   void release_memory() override {
     state_.release_memory();
     law_.release();
+  }
+  void restore_memory() override {
+    if (!law_.released()) return;
+    state_.prepare(law_);
+    set_step();
+    law_.restore(mesh_);
   }
 
   void positions(Matrix3Xd& x) const override {
@@ -175,17 +177,16 @@ class TriangleSolver : public SheetSolver {
 
   int bands(const ThreadPool& pool) const { return std::min(pool.threads(), most_threads()); }
 
-  // What the law takes from the length of a step.
+  // What depends on the length of a step.
   void set_step() {
     law_.damping = static_cast<T>(mesh_.damping / (2 * dt_));
     law_.wind.to_velocity = static_cast<T>(1 / (6 * dt_));
-    law_.drags = dynamics_.drag.size() > 0;
-    if (law_.drags && state_.drag.size() == 0) state_.drag = AlignedArray<T>(state_.size());
-  }
-  // After release_memory().
-  void complete() {
-    if (law_.released()) law_.restore(mesh_);
-    state_.prepare(law_);
+    for (int i = 0; i < particles_; ++i) {
+      const double inverse_mass = dynamics_.inverse_mass[i];
+      put(state_.step2, i, Vector3d::Constant(inverse_mass * dt_ * dt_));
+      if (law_.drags)
+        put(state_.drag, i, Vector3d::Constant(dynamics_.drag[i] * inverse_mass * dt_));
+    }
   }
 
   // Where the values of a particle begin.

@@ -357,24 +357,26 @@ template <class T>
 TriangleState<T>::TriangleState(int particles, bool compensated) {
   constexpr int kBlock = TriangleLaw<T>::kBlock;
   const auto size = 4 * static_cast<std::size_t>((particles + kBlock - 1) / kBlock * kBlock);
-  for (auto* plane : {&x, &w, &d, &step2}) *plane = AlignedArray<T>(size);
+  for (auto* plane : {&x, &w, &d}) *plane = AlignedArray<T>(size);
   if (compensated)
     for (auto* plane : {&x_error, &d_error}) *plane = AlignedArray<T>(size);
 }
 
 template <class T>
 void TriangleState<T>::release_memory() {
-  for (auto* plane : {&next_x, &next_w, &tension, &wind}) *plane = {};
+  for (auto* plane : {&step2, &drag, &next_x, &next_w, &tension, &wind}) *plane = {};
 }
 
 template <class T>
 void TriangleState<T>::prepare(const TriangleLaw<T>& law) {
   if (next_x.size() > 0) return;
   const auto triangles = static_cast<std::size_t>(law.groups) * TriangleLaw<T>::kLanes;
-  next_x = AlignedArray<T>(size());
-  next_w = AlignedArray<T>(size());
-  tension = AlignedArray<T>(3 * triangles + 1);
+  step2 = AlignedArray<T>(size());
+  if (law.drags) drag = AlignedArray<T>(size());
   if (law.wind.blows) wind = AlignedArray<T>(4 * triangles);
+  tension = AlignedArray<T>(3 * triangles + 1);
+  next_w = AlignedArray<T>(size());
+  next_x = AlignedArray<T>(size());
 }
 
 template <class T>

@@ -12,14 +12,16 @@ struct TriangleState {
   AlignedArray<T> x;        // position, m
   AlignedArray<T> w;        // 3 d - d_previous: velocity x 2 dt, m
   AlignedArray<T> d;        // displacement of the last step, m
-  AlignedArray<T> step2;    // dt^2 / mass, s^2/kg; 0 holds a particle
-  AlignedArray<T> drag;     // c dt / m; or empty
   AlignedArray<T> x_error;  // what rounding has added to x, m; with compensation only, as the next
   AlignedArray<T> d_error;  // what rounding has added to d, m
 
+  // What follows from mass, drag and the step.
+  AlignedArray<T> step2;  // dt^2 / mass, s^2/kg; 0 holds a particle
+  AlignedArray<T> drag;   // c dt / m; or empty
   // What only sweeps need: the next x and w, tensions (groups x 3 x kLanes, then a 0), forces of
   // wind on a triangle's corners.
   AlignedArray<T> next_x, next_w, tension, wind;
+  // Lets go of these, until they are prepared; step2 and drag are then to be set.
   void release_memory();
   void prepare(const TriangleLaw<T>& law);
 

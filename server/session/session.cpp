@@ -60,11 +60,11 @@ std::optional<Clock::time_point> Session::run_slice() {
   try {
     if (!go_on_with_frame() && !settle()) return std::nullopt;
     write_limit();
-    const auto due = next_due();
-    if (!due || *due > Clock::now()) return due;
-    compute_frame(*due);
-    if (!go_on_with_frame() && !settle()) return std::nullopt;
-    write_limit();
+    if (const auto due = due_time(); due && *due <= Clock::now()) {
+      compute_frame(*due);
+      if (!go_on_with_frame() && !settle()) return std::nullopt;
+      write_limit();
+    }
   } catch (const std::bad_alloc&) {
     fail("the server ran out of memory");
   }
@@ -231,17 +231,21 @@ void Session::fail(const std::string& why) {
   offer_to_all();
 }
 
-// When the next frame is to be computed; nullopt: not before something happens.
+// When the next frame is to be computed, or memory let go; nullopt: not before something happens.
 std::optional<Clock::time_point> Session::next_due() {
-  const auto due = due_time();
-  if (!due && idle()) timeline_.simulation.release_memory();
-  return due;
+  if (const auto due = due_time()) return due;
+  const auto since = idle_since();
+  if (!since) return std::nullopt;
+  if (Clock::now() < *since + kUnpackedTime) return *since + kUnpackedTime;
+  timeline_.simulation.release_memory();
+  return std::nullopt;
 }
 
-// Whether there is nothing to compute: nothing was asked for, or there is nobody to see it.
-bool Session::idle() {
+// Since when there is nothing to compute: nothing was asked for, or there is nobody to see it.
+std::optional<Clock::time_point> Session::idle_since() const {
   std::lock_guard lock(mutex_);
-  return !active() || (!restoring_ && unattended());
+  if (active() && (restoring_ || !unattended())) return std::nullopt;
+  return used_;
 }
 
 std::optional<Clock::time_point> Session::due_time() {

@@ -98,6 +98,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   static constexpr std::size_t kMaxAnswers = 1000;
   // How long a session that sleeps without a goal and a stream goes on after somebody looked.
   static constexpr std::chrono::seconds kAwakeTime{2};
+  // How long one with nothing to do holds what the next frame needs and can be made again: longer
+  // than those who step it frame by frame take between two.
+  static constexpr std::chrono::seconds kUnpackedTime{1};
   // How long a session that was restored waits for subscribers that it had held frames for, and may
   // be restored again with the frames that subscribers had.
   static constexpr std::chrono::seconds kHoldAfterRestore{30};
@@ -171,7 +174,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   void fail(const std::string& why);
   std::optional<Clock::time_point> next_due();
   std::optional<Clock::time_point> due_time();
-  bool idle();
+  std::optional<Clock::time_point> idle_since() const;
   void offer_to_all();
 
   // Commands: checked, written, carried out, answered. session_commands.cpp

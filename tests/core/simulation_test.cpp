@@ -7,6 +7,7 @@
 #include <cstring>
 #include <memory>
 #include <numbers>
+#include <vector>
 
 #include "tests/support/core/scenes.h"
 
@@ -320,6 +321,33 @@ TEST(Simulation, Of961ParticlesTakesAtMost128KiBWhilePacked) {
   if (used() == before) GTEST_SKIP() << "this allocator does not count";
   simulation.release_memory();
   EXPECT_LE(used() - before, 128u << 10);
+}
+
+TEST(Simulation, AnswersTheSameWhilePacked) {
+  Simulation kept(hanging()), packed(hanging());
+  run(kept, 5);
+  run(packed, 5);
+  packed.release_memory();
+  EXPECT_EQ(packed.stats().potential_energy, kept.stats().potential_energy);
+  packed.release_memory();
+  EXPECT_EQ(positions(packed), positions(kept));
+  packed.release_memory();
+  EXPECT_EQ(velocities(packed), velocities(kept));
+  packed.release_memory();
+  const std::vector<Action> grab = {{.kind = Action::Kind::kGrab, .particle = 24}};
+  EXPECT_EQ(packed.problems_of(grab).size(), 0u);
+  packed.release_memory();
+  ASSERT_FALSE(packed.act(grab));
+  ASSERT_FALSE(kept.act(grab));
+  packed.release_memory();
+  Textile textile = packed.scene().sheets[0].textile;
+  std::get<RawTextile>(textile.model).stretch *= 0.5;
+  ASSERT_FALSE(packed.set_textile(0, textile));
+  ASSERT_FALSE(kept.set_textile(0, textile));
+  packed.release_memory();
+  run(kept, 5);
+  run(packed, 5);
+  EXPECT_EQ(positions(packed), positions(kept));
 }
 
 TEST(Simulation, ASceneAtRestSleepsUntilItsTextileChanges) {

@@ -12,6 +12,8 @@
 
 #include "tests/server/session/session_support.h"
 #include "tests/support/core/faulty_solver.h"
+#include "tests/support/core/scenes.h"
+#include "tests/support/core/triangle_meshes.h"
 
 namespace weft::testing {
 namespace {
@@ -121,6 +123,51 @@ TEST(Session, WithNothingToDoHoldsAThirdLessThanWhatItsSimulationMovesIn) {
   for (int i = 0; i < 1000 && holds() > 0.67 * moves_in; ++i) std::this_thread::sleep_for(10ms);
   EXPECT_LT(holds(), 0.67 * moves_in);
   EXPECT_GT(holds(), 0.3 * moves_in);
+}
+
+// A square metre of 10 000 vertices, in a mesh of its own.
+Scene cloth_of_triangles() {
+  SheetDefinition sheet;
+  sheet.name = "cloth";
+  sheet.shape = complete(triangle_mesh(square(Cut::kAlternating, 1, 1.0 / 99)));
+  sheet.textile.model = MeasuredTextile{.areal_density = 0.15,
+                                        .tensile_warp = 100,
+                                        .tensile_weft = 100,
+                                        .shear = 10,
+                                        .bend_rigidity_warp = 1e-6,
+                                        .bend_rigidity_weft = 1e-6,
+                                        .air_drag = 0.1};
+  sheet.bending = Isometric{};
+  sheet.pins = {{{0, 99}, {}}};
+  Scene scene = floating(sheet);
+  scene.solver.frame_step = 1e-3;
+  scene.solver.precision = Precision::kSingle;
+  return scene;
+}
+
+TEST(Session, OfTrianglesHoldsAtMost200BytesAVertexAndItsFramesWhileIdle) {
+  constexpr double kVertices = 10'000;
+  const auto used = [] {
+    const struct mallinfo2 now = mallinfo2();
+    return static_cast<double>(now.uordblks + now.hblkhd);
+  };
+  Scheduler scheduler(1);
+  step(*make_session(scheduler, cloth_of_triangles()), 1).applied();  // what a thread keeps
+  std::promise<void> idle;
+  ASSERT_TRUE(scheduler.post([&] { idle.set_value(); }));
+  idle.get_future().wait();
+  std::this_thread::sleep_for(2 * Session::kUnpackedTime);  // until it is gone
+  const double before = used();
+  const auto session = make_session(scheduler, cloth_of_triangles());
+  if (used() == before) GTEST_SKIP() << "this allocator does not count";
+  step(*session, 1).applied();
+  const auto holds = [&] {
+    return (used() - before - 2 * static_cast<double>(session->status().newest->bytes())) /
+           kVertices;
+  };
+  for (int i = 0; i < 1000 && holds() > 200; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_LE(holds(), 200);
+  EXPECT_GT(holds(), 64) << "what was given: start, flat shape and triangles";
 }
 
 TEST(Session, AsleepGoesOnWithItsFirstStream) {

@@ -88,14 +88,14 @@ Vector2d largest_size(const TriangleMesh& mesh) {
 }  // namespace
 
 Triangles complete(TriangleMesh mesh) {
-  if (mesh.flat.empty() && mesh.flat_triangles.empty()) {
-    mesh.flat.reserve(mesh.start.size());
+  if (mesh.flat.empty() && mesh.flat_triangles.empty())
     for (const Vector3d& x : mesh.start) mesh.flat.emplace_back(x.z(), x.x());
-  }
-  if (mesh.start.empty() && mesh.flat_triangles.empty()) {
-    mesh.start.reserve(mesh.flat.size());
+  if (mesh.start.empty() && mesh.flat_triangles.empty())
     for (const Vector2d& corner : mesh.flat) mesh.start.emplace_back(corner.y(), 0, corner.x());
-  }
+  mesh.start.shrink_to_fit();
+  mesh.flat.shrink_to_fit();
+  mesh.triangles.shrink_to_fit();
+  mesh.flat_triangles.shrink_to_fit();
   if (mesh.panels.empty())
     mesh.panels.push_back({"panel", static_cast<int>(mesh.triangles.size()), 0});
   if (is_sound(mesh)) {

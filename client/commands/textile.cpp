@@ -35,7 +35,7 @@ void list_textiles(Context& context) {
 }
 
 // Place of a word in the list, from 1; at its end where it is new.
-std::size_t place_in(std::vector<std::string>& list, const std::string& word) {
+std::size_t index_in(std::vector<std::string>& list, const std::string& word) {
   const auto found = std::find(list.begin(), list.end(), word);
   const auto place = static_cast<std::size_t>(found - list.begin()) + 1;
   if (found == list.end()) list.push_back(word);
@@ -72,7 +72,7 @@ void run_show(Context& context, const std::string& name) {
   for (const auto& property : textile.properties()) {
     table.add({property.field(), si_text(textile.values(), property.field()), property.value(),
                property.unit(),
-               fmt::format("{} [{}]", property.status(), place_in(sources, property.source()))});
+               fmt::format("{} [{}]", property.status(), index_in(sources, property.source()))});
   }
   std::string notes;
   for (std::size_t i = 0; i < sources.size(); ++i)

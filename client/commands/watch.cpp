@@ -41,9 +41,9 @@ Json frame_json(const v1::Frame& frame, double pace) {
 }
 
 // Shows frames: in place on a terminal, else a line for each, in JSON or at most one a second.
-class View {
+class Display {
  public:
-  explicit View(Context& context)
+  explicit Display(Context& context)
       : context_(context),
         status_(context.terminal.out, context.terminal.out_is_watched && !context.json) {}
 
@@ -132,15 +132,15 @@ class View {
 
 // Watches until the end; false: the watcher was too slow and must begin anew at the newest frame.
 bool watch(Context& context, const std::string& session, const WatchOptions& options,
-           bool& to_be_run, View& view) try {
+           bool& to_be_run, Display& display) try {
   FrameFeed feed(context.connection(), stream_request(session, options), std::chrono::seconds(60));
   while (const auto message = feed.next()) {
     if (message->has_header() && std::exchange(to_be_run, false))
       let_run(context, session, options);
     if (message->has_progress() && message->progress().frame_share() > 0)
-      view.show_share(message->progress());
+      display.show_share(message->progress());
     if (!message->has_frame()) continue;
-    view.show(message->frame());
+    display.show(message->frame());
     if (options.until_rest && message->frame().stats().at_rest()) break;
   }
   return true;
@@ -152,10 +152,10 @@ bool watch(Context& context, const std::string& session, const WatchOptions& opt
 void run_watch(Context& context, const WatchOptions& options) {
   const std::string session = context.session_or_scene(options.session);
   bool to_be_run = options.run || context.embedded;
-  View view(context);
-  while (!watch(context, session, options, to_be_run, view)) {
+  Display display(context);
+  while (!watch(context, session, options, to_be_run, display)) {
   }
-  view.finish();
+  display.finish();
   const bool has_end = options.to || options.until_rest;
   if (has_end && context.stop.stop_requested()) throw interrupted();
 }

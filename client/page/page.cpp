@@ -36,7 +36,7 @@ constexpr double kMostSteps = 1 << 30;              // from the origin
 constexpr std::int64_t kMostNumbers = 100'000'000;  // 400 MB in the browser
 
 // What the page needs to know of a recording before it holds the frames.
-struct Survey {
+struct Summary {
   Tally tally;
   std::array<double, 3> low{}, high{};  // of all positions, m
   std::vector<double> times_s;
@@ -69,8 +69,8 @@ FrameRange frames_of(const RecordingReader& recording, const FrameRange& wanted)
   return range;
 }
 
-Survey survey_of(RecordingReader& recording, const FrameRange& range) {
-  Survey found;
+Summary summary_of(RecordingReader& recording, const FrameRange& range) {
+  Summary found;
   found.low.fill(std::numeric_limits<double>::infinity());
   found.high.fill(-std::numeric_limits<double>::infinity());
   for (auto number = range.first; number <= range.last; ++number) {
@@ -94,19 +94,19 @@ Survey survey_of(RecordingReader& recording, const FrameRange& range) {
   return found;
 }
 
-std::array<double, 3> middle_of(const Survey& survey) {
+std::array<double, 3> middle_of(const Summary& summary) {
   std::array<double, 3> middle{};
   for (std::size_t axis = 0; axis < 3; ++axis)
-    middle[axis] = (survey.low[axis] + survey.high[axis]) / 2;
+    middle[axis] = (summary.low[axis] + summary.high[axis]) / 2;
   return middle;
 }
 
-double quantum_of(const std::vector<ClothMesh>& sheets, const Survey& survey) {
+double quantum_of(const std::vector<ClothMesh>& sheets, const Summary& summary) {
   double quantum = std::numeric_limits<double>::infinity();
   for (const ClothMesh& sheet : sheets)
     quantum = std::min(quantum, sheet.spacing_m / kStepsOfSpacing);
   for (std::size_t axis = 0; axis < 3; ++axis)
-    quantum = std::max(quantum, (survey.high[axis] - survey.low[axis]) / kMostSteps);
+    quantum = std::max(quantum, (summary.high[axis] - summary.low[axis]) / kMostSteps);
   return quantum;
 }
 
@@ -171,36 +171,36 @@ struct Source {
         facts(exhibit.facts),
         recording(exhibit.path),
         range(frames_of(recording, wanted)),
-        survey(survey_of(recording, range)),
+        summary(summary_of(recording, range)),
         cloth(cloth_of(recording)),
-        quantum_m(quantum_of(cloth, survey)) {}
+        quantum_m(quantum_of(cloth, summary)) {}
 
   std::string name;
   std::vector<std::pair<std::string, std::string>> facts;
   RecordingReader recording;
   FrameRange range;
-  Survey survey;
+  Summary summary;
   std::vector<ClothMesh> cloth;
   double quantum_m;
 };
 
 Json recording_json(const Source& source) {
   const RecordingReader& recording = source.recording;
-  const Survey& survey = source.survey;
-  Json facts = page_facts(recording, source.cloth, survey.tally);
+  const Summary& summary = source.summary;
+  Json facts = page_facts(recording, source.cloth, summary.tally);
   if (!source.facts.empty()) {
     const Json measured{{"group", "Measured"}, {"rows", source.facts}};
     facts.insert(facts.begin(), measured);
   }
   return {{"name", source.name},
           {"particles", particles_of(recording.header())},
-          {"first_frame", survey.tally.first_frame},
-          {"time_s", survey.times_s},
-          {"origin_m", middle_of(survey)},
+          {"first_frame", summary.tally.first_frame},
+          {"time_s", summary.times_s},
+          {"origin_m", middle_of(summary)},
           {"quantum_m", source.quantum_m},
-          {"low_m", survey.low},
-          {"high_m", survey.high},
-          {"stats", recording.header().format().stats() ? stats_json(survey.stats) : Json()},
+          {"low_m", summary.low},
+          {"high_m", summary.high},
+          {"stats", recording.header().format().stats() ? stats_json(summary.stats) : Json()},
           {"sheets", sheets_json(recording, source.cloth)},
           {"colliders", colliders_json(recording.scene())},
           {"gravity_m_per_s2",
@@ -252,13 +252,13 @@ PageResult write_page(const PageOrder& order,
   for (Source& source : sources) {
     progress(fmt::format("{}: {}", order.path, source.recording.path()));
     file.write(fmt::format("<script type=\"text/plain\" id=\"frames-{}\">", recordings.size()));
-    PackedFrames frames(file, middle_of(source.survey), source.quantum_m);
+    PackedFrames frames(file, middle_of(source.summary), source.quantum_m);
     for (auto number = source.range.first; number <= source.range.last; ++number)
       frames.add(points_of(source.recording, source.recording.read(number)));
     frames.finish();
     file.write("</script>\n");
     recordings.push_back(recording_json(source));
-    result.frames += source.survey.tally.frames;
+    result.frames += source.summary.tally.frames;
     result.largest_error_m = std::max(result.largest_error_m, source.quantum_m / 2);
   }
   const Json description{{"title", order.title},

@@ -10,12 +10,12 @@
 namespace weft::testing {
 namespace {
 
-constexpr int kParticles = 500;
+constexpr int kCount = 500;
 
 v1::StreamHeader header_of(double step) {
   v1::StreamHeader header;
   header.add_sheets()->set_rows(1);
-  header.mutable_sheets(0)->set_columns(kParticles);
+  header.mutable_sheets(0)->set_columns(kCount);
   header.mutable_format()->set_encoding(v1::FRAME_ENCODING_QUANTIZED_ZSTD);
   header.mutable_format()->set_grid_step_m(step);
   return header;
@@ -32,7 +32,7 @@ std::vector<double> wild_positions(double farthest) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> exponent(-12, std::log10(farthest)), sign(-1, 1);
   std::vector<double> positions{0, farthest, -farthest, farthest, 1e-300, -0.0};
-  while (positions.size() < 3 * kParticles)
+  while (positions.size() < 3 * kCount)
     positions.push_back(std::copysign(std::pow(10, exponent(random)), sign(random)));
   return positions;
 }
@@ -46,9 +46,9 @@ TEST(Quantized, KeepsEveryPositionWithinHalfAStep) {
       ASSERT_TRUE(client::is_whole(frame, header));
       const client::Points found = client::read_points(frame.positions_m(), header);
       for (std::size_t i = 0; i < sent.size(); ++i) {
-        const auto& plane = i < kParticles ? found.x : i < 2 * kParticles ? found.y : found.z;
+        const auto& plane = i < kCount ? found.x : i < 2 * kCount ? found.y : found.z;
         const double rounding = 4e-16 * std::abs(sent[i]);
-        ASSERT_NEAR(plane[i % kParticles], sent[i], step / 2 + rounding) << step;
+        ASSERT_NEAR(plane[i % kCount], sent[i], step / 2 + rounding) << step;
       }
     }
   }
@@ -66,7 +66,7 @@ TEST(Quantized, IsRefusedWhereItIsCutShortOrOfAnotherSize) {
   EXPECT_FALSE(client::is_whole(frame, header));
   frame.set_positions_m(whole);
   v1::StreamHeader other = header;
-  other.mutable_sheets(0)->set_columns(kParticles - 1);
+  other.mutable_sheets(0)->set_columns(kCount - 1);
   EXPECT_FALSE(client::is_whole(frame, other));
 }
 

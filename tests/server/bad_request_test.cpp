@@ -270,7 +270,7 @@ TEST(BadRequests, OfEveryFieldAreRefusedByNameAndChangeNothing) {
 }
 
 TEST(BadRequests, OfDamagedBytesAreRefusedOrReadAsTheyAre) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef WEFT_SANITIZED
   constexpr int kRounds = 100;
 #else
   constexpr int kRounds = 3000;  // for each method: 50 000 and more in all

@@ -15,7 +15,7 @@ namespace weft {
 namespace {
 
 constexpr int kLargestSpecimen = 6000;  // of a specimen: seconds of Newton's method
-constexpr double kWidth = 0.025;      // of a strip, m: ASTM D1388
+constexpr double kWidth = 0.025;        // of a strip, m: ASTM D1388
 
 int steps_of(double length, double spacing) {
   return std::max(1, static_cast<int>(std::lround(length / spacing)));
@@ -479,8 +479,8 @@ std::vector<Problem> find_problems(const LabOrder& order) {
     if (!(spacing >= 1e-5 && spacing <= 0.1))
       problems.push_back({field, join(spacing, " m is not within 1e-05 to 0.1 m")});
     else if (particles_of(order, spacing) > kLargestSpecimen)
-      problems.push_back({field, join(spacing, " m makes a specimen of more than ", kLargestSpecimen,
-                                      " particles")});
+      problems.push_back({field, join(spacing, " m makes a specimen of more than ",
+                                      kLargestSpecimen, " particles")});
   }
   return problems;
 }

@@ -35,7 +35,7 @@ class LoadedValues {
   void take(T* values, std::size_t count) {
     static_assert(std::is_arithmetic_v<T>);
     enough_ &= count * sizeof(T) <= bytes_.size() - at_;
-    if (!enough_) return;
+    if (!enough_ || count == 0) return;
     std::memcpy(values, bytes_.data() + at_, count * sizeof(T));
     at_ += count * sizeof(T);
   }

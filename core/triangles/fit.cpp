@@ -209,8 +209,8 @@ class FreeParts {
           member.basis[static_cast<std::size_t>(q)] = static_cast<float>(root * fit.basis(row, q));
         if (fit.near[k].turn == Plane2(1)) continue;
         member.turned = static_cast<int>(turns_.size());
-        turns_.push_back(into(fit.near[k].turn).cast<float>());
-        turns_.push_back(into(std::conj(fit.near[k].turn)).cast<float>());
+        turns_.emplace_back(into(fit.near[k].turn).cast<float>());
+        turns_.emplace_back(into(std::conj(fit.near[k].turn)).cast<float>());
       }
     }
   }

@@ -57,21 +57,21 @@ class Arrivals {
   std::jthread thread_;
 };
 
-struct Seen {
+struct ViewCounts {
   int frames = 0;
   int wrong = 0;           // frames where the numbers and the skipped ones do not add up
   Seconds greatest_age{};  // when it is drawn
 };
 
 // Draws five frames a second, and grants a credit as soon as it has one to draw.
-Seen view(client::Connection& connection, const Arrivals& arrivals, const std::string& session,
-          int window, std::chrono::seconds duration) {
+ViewCounts view(client::Connection& connection, const Arrivals& arrivals,
+                const std::string& session, int window, std::chrono::seconds duration) {
   grpc::ClientContext context;
   const auto stream = connection.frames().ViewFrames(&context);
   v1::ViewFramesRequest request;
   request.set_session(session);
   request.set_credits(window);
-  Seen seen;
+  ViewCounts seen;
   std::int64_t next = -1;
   const auto end = Clock::now() + duration;
   bool open = stream->Write(request);
@@ -105,7 +105,7 @@ Outcome view_age(Form form) {
   run.set_time_scale(0.5);
   connection->call(&v1::SessionService::Stub::RunSession, run);
   const Arrivals arrivals(*connection, run.name());
-  std::vector<std::future<Seen>> views;
+  std::vector<std::future<ViewCounts>> views;
   for (const int window : kWindows) {
     views.push_back(std::async(std::launch::async, [&, window] {
       return view(*connection, arrivals, run.name(), window, duration);
@@ -113,7 +113,7 @@ Outcome view_age(Form form) {
   }
   Outcome outcome{.figure = "5 of 30 frames/s:", .hold = "(window + 1) x 200 ms + 50 ms"};
   for (std::size_t i = 0; i < kWindows.size(); ++i) {
-    const Seen seen = views[i].get();
+    const ViewCounts seen = views[i].get();
     const Seconds most = (kWindows[i] + 1) * kDrawing + std::chrono::milliseconds(50);
     outcome.figure += fmt::format("{} window {}: {} frames, at most {} old, {} miscounted",
                                   i == 0 ? "" : ";", kWindows[i], seen.frames,

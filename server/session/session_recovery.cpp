@@ -14,7 +14,7 @@ bool Session::restore(SavedSession saved) {
     journal_.limit = saved.limit;
     journal_.named = std::move(saved.named);
     if (!begun && saved.log.empty()) return true;
-    const auto next = saved.log.begin() + timeline_.entries - saved.first;
+    const auto next = saved.log.begin() + (timeline_.entries - saved.first);
     repeats = next != saved.log.end() || run_ || queue_.has_steps();
     if (repeats) {
       set_state(SessionState::kRestoring);

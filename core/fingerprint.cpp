@@ -2,19 +2,28 @@
 
 #include <bit>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "core/simulation.h"
+#include "core/triangles/cut.h"
 
 namespace weft {
 namespace {
 
+// Two panels, across the warp and along it.
+SheetShape rough_mesh() {
+  TriangleMesh mesh = triangle_mesh(cut_rectangle(Cut::kIrregular, 0.16, 0.03, 0.01));
+  const auto triangles = static_cast<int>(mesh.triangles.size());
+  mesh.panels = {{"left", triangles / 2, 1.3}, {"right", triangles - triangles / 2, 0.1}};
+  return complete(std::move(mesh));
+}
+
 // Uneven, so that every kind of force acts from the first step.
-SheetDefinition rough_sheet(const BendingLaw& bending) {
+SheetDefinition rough_sheet(const SheetShape& shape, const BendingLaw& bending) {
   SheetDefinition sheet;
   sheet.name = "sheet";
-  const Grid grid{4, 17, 0.01};
-  sheet.shape = grid;
+  sheet.shape = shape;
   sheet.textile.model = MeasuredTextile{.areal_density = 0.2,
                                         .tensile_warp = 300,
                                         .tensile_weft = 200,
@@ -24,17 +33,18 @@ SheetDefinition rough_sheet(const BendingLaw& bending) {
                                         .air_drag = 0.1};
   sheet.bending = bending;
   std::minstd_rand random;
-  for (int r = 0; r < grid.rows; ++r)
-    for (int c = 0; c < grid.columns; ++c)
-      for (const double at : {c * 0.0098, 0.0, r * 0.0098})
-        sheet.start_positions.push_back(at + 1e-3 * static_cast<double>(random()) / random.max());
+  for (int i = 0; i < particle_count(shape); ++i)
+    for (const double at : local_position(shape, i))
+      sheet.start_positions.push_back(0.98 * at +
+                                      1e-3 * static_cast<double>(random()) / random.max());
   sheet.pins = {{{0}, {}}};
   return sheet;
 }
 
-Scene rough_scene(const std::vector<BendingLaw>& laws) {
+Scene rough_scene(const std::vector<BendingLaw>& laws, const BendingLaw& law_of_mesh) {
   Scene scene;
-  for (const BendingLaw& law : laws) scene.sheets.push_back(rough_sheet(law));
+  for (const BendingLaw& law : laws) scene.sheets.push_back(rough_sheet(Grid{4, 17, 0.01}, law));
+  scene.sheets.push_back(rough_sheet(rough_mesh(), law_of_mesh));
   scene.colliders.push_back({"sphere", Sphere{{0.1, -0.05, 0.02}, 0.05}, 0.3, {}});
   scene.colliders.push_back({"plane", Plane{}, 0.3, {}});
   scene.environment.wind = {.velocity = {1, 2, 3}, .gust = 0.5, .tangential_drag = 0.1};
@@ -55,8 +65,10 @@ std::uint64_t fingerprint() {
   segments = {.segments = 60, .fold_clamp = true, .diagonal_bend = false};
   optimal.optimal_breakpoints = true;
   polynomial.evaluator = Evaluator::kPolynomial;
-  const Scene single = rough_scene({ChoiKo{}, segments, optimal, polynomial, Isometric{}});
-  Scene twofold = rough_scene({ChoiKo{}, Isometric{}}), plain = rough_scene({series, exact});
+  const Scene single =
+      rough_scene({ChoiKo{}, segments, optimal, polynomial, Isometric{}}, Isometric{});
+  Scene twofold = rough_scene({ChoiKo{}, Isometric{}}, Isometric{});
+  const Scene plain = rough_scene({series, exact}, series);
   twofold.solver.precision = Precision::kDouble;
   for (const Scene& scene : {single, twofold, plain}) {
     Simulation simulation(scene);

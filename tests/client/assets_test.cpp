@@ -25,13 +25,13 @@ ServerOptions with_host() {
 TEST(ClientAssets, AreSentOnceAndGoOnWhereAConnectionBroke) {
   constexpr int kBreaks = 3;
   Service service(with_host());
-  // some 8 MB; what breaks is counted in bytes of answers, few of which come meanwhile
-  const v1::MeshData mesh = square_mesh(500);
-  const BreakingProxy proxy(service.server.address(), {.breaks = kBreaks, .after_bytes = 700});
+  const v1::MeshData mesh = square_mesh(500);  // some 8 MB
+  const BreakingProxy proxy(service.server.address(),
+                            {.breaks = kBreaks, .after_asked_bytes = 1'500'000});
   const auto connection = Connection::to(proxy.address(), std::stop_token());
   connection->call(&v1::ServerService::Stub::GetServerInfo, v1::GetServerInfoRequest());
   const v1::Asset asset = client::upload_mesh(*connection, mesh);
-  EXPECT_GT(proxy.broken(), 0);
+  EXPECT_EQ(proxy.broken(), kBreaks);
   EXPECT_EQ(download(*service.assets, asset.name()).first, mesh.SerializeAsString());
   const std::size_t sent = proxy.asked().size();
   EXPECT_LT(sent, 2 * mesh.ByteSizeLong());

@@ -90,11 +90,12 @@ void BreakingProxy::accept_connections() {
   for (auto& relay : relays_) relay.join();
 }
 
-bool BreakingProxy::pass(int from, int to, bool answers, std::size_t& answered) {
+bool BreakingProxy::pass(int from, int to, bool answers, std::size_t& passed) {
   std::array<char, 4096> buffer{};
   const ssize_t received = ::recv(from, buffer.data(), buffer.size(), 0);
   if (received <= 0) return false;
   const auto size = static_cast<std::size_t>(received);
+  passed += size;
   if (!answers) {
     const std::lock_guard lock(mutex_);
     asked_.append(buffer.data(), size);
@@ -104,7 +105,6 @@ bool BreakingProxy::pass(int from, int to, bool answers, std::size_t& answered) 
     if (fault_.delay.count() > 0) std::this_thread::sleep_for(fault_.delay);
     if (!send_all(to, buffer.data() + begin, std::min(fault_.slice, size - begin))) return false;
   }
-  answered += size;
   return true;
 }
 
@@ -116,13 +116,13 @@ void BreakingProxy::relay(int client) {
   bool open = ::connect(server, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
   const bool breaks = breaks_left_-- > 0;
   bool broken = false;
-  std::size_t answered = 0;
+  std::array<std::size_t, 2> passed{};  // of requests, of answers
   std::array<pollfd, 2> ends{pollfd{client, POLLIN, 0}, pollfd{server, POLLIN, 0}};
   while (open && !closed_) {
     ::poll(ends.data(), ends.size(), kPollMs);
     for (std::size_t i = 0; i < ends.size() && open; ++i)
-      if (ends[i].revents != 0) open = pass(ends[i].fd, ends[1 - i].fd, i == 1, answered);
-    broken = breaks && answered > fault_.after_bytes;
+      if (ends[i].revents != 0) open = pass(ends[i].fd, ends[1 - i].fd, i == 1, passed[i]);
+    broken = breaks && passed[0] > fault_.after_asked_bytes && passed[1] > fault_.after_bytes;
     open = open && !broken;
   }
   if (broken) ++broken_;

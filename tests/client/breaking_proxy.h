@@ -17,8 +17,9 @@ struct NetworkFault {
     kCut,      // both see an orderly end
     kSwallow,  // what is sent is lost in silence for a while, then both see a reset
   };
-  int breaks = 0;               // connections that end early
-  std::size_t after_bytes = 0;  // of answers, each
+  int breaks = 0;                     // connections that end early, each
+  std::size_t after_bytes = 0;        // after so many of answers
+  std::size_t after_asked_bytes = 0;  // and of requests
   End end = End::kReset;
   std::size_t slice = 4096;              // most bytes that are passed on at a time
   std::chrono::microseconds delay = {};  // before each slice
@@ -40,8 +41,8 @@ class BreakingProxy {
  private:
   void accept_connections();
   void relay(int client);
-  // Passes on what the other end sent; false where it has ended.
-  bool pass(int from, int to, bool answers, std::size_t& answered);
+  // Passes on what the other end sent, and counts it; false where it has ended.
+  bool pass(int from, int to, bool answers, std::size_t& passed);
 
   std::string target_;
   std::string address_;

@@ -53,6 +53,8 @@ class AccuracyPage {
                  number(p.largest), number(p.energy)});
     if (measured.given.smooth)
       smooth_ = measured;
+    else if (measured.given.triangles)
+      triangles_.push_back(measured);
     else
       all_.push_back(measured);
   }
@@ -70,6 +72,7 @@ class AccuracyPage {
     best();
     resolution();
     chaos();
+    triangles();
     model();
     page_.write();
   }
@@ -566,6 +569,31 @@ class AccuracyPage {
     page_.table({"scene", "k_d kg/s", "step and 1/2", "1/4 and 1/8"}, rows);
   }
 
+  void triangles() {
+    page_.text("## Sheets of triangles");
+    page_.text(
+        "The same cloths on triangles between points of that lattice, each moved by up to 0.3 of "
+        "the spacing, with their membrane and fitted curvatures; truths as above. RMS error in m "
+        "and, in brackets, ms per simulated second.");
+    std::vector<Cells> rows;
+    for (const Measured& m : triangles_) {
+      Cells row = {m.given.title(),
+                   fmt::format("{:.1f}", 1e6 / 60.0 / static_cast<double>(m.given.substeps)),
+                   fmt::format("{} ({:.2f})", short_number(m.truth.error), m.truth.order)};
+      const auto add = [&](const Point& p) {
+        row.push_back(fmt::format("{} ({:.3g})", short_number(p.rms), 1e3 * p.time));
+      };
+      for (const auto precision : {Precision::kSingle, Precision::kDouble})
+        for (const int finer : {1, 4}) add(*m.find({.precision = precision, .finer = finer}));
+      for (const Point& p : m.accuracies) add(p);
+      row.push_back(order_text(m, {.precision = Precision::kDouble}));
+      rows.push_back(row);
+    }
+    page_.table({"scene", "planned step us", "truth's error m (order)", "single", "single, / 4",
+                 "double", "double, / 4", "DRAFT", "STANDARD", "FINE", "Verlet's order"},
+                rows);
+  }
+
   // Chord angles or moduli by quantity and spacing, beside what was asked.
   static void add_values(const LabReport& report, const std::string& quantity,
                          const std::string& law, std::vector<Cells>& rows) {
@@ -652,6 +680,7 @@ class AccuracyPage {
 
   Page page_;
   std::vector<Measured> all_;  // sides of a scene in order
+  std::vector<Measured> triangles_;
   std::optional<Measured> smooth_;
 };
 
@@ -672,6 +701,10 @@ void accuracy(const std::filesystem::path& folder, const std::string& commit, bo
     for (const Case& given : cases) page.add(measure(given, frames, large));
   }
   page.add(measure(make_case("taut", 16), 6, large));
+  for (const char* name : {"hang", "flag", "sphere", "box"}) {
+    const Case given = make_triangle_case(name, 31);
+    page.add(measure(given, std::max(calm_frames(given, kMostFrames), 1), large));
+  }
   page.write();
 }
 

@@ -49,6 +49,12 @@ std::vector<Setting> settings_for(const Case& given, bool large) {
     add({law, kind, Precision::kDouble, finer, true});
   };
 
+  if (given.triangles) {
+    for (const int finer : {1, 2, 4, 8})
+      for (const auto precision : {Precision::kSingle, Precision::kDouble})
+        add({.precision = precision, .finer = finer});
+    return settings;
+  }
   if (given.smooth) {
     for (const int finer : {1, 2, 4, 8}) {
       add({.law = kFinePolynomial, .precision = Precision::kDouble, .finer = finer});

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/triangles/cut.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::reports {
@@ -25,8 +26,11 @@ constexpr MeasuredTextile kTarpaulin{.areal_density = 0.5,
                                      .bend_rigidity_weft = 5e-4,
                                      .air_drag = 0.02};
 
-SheetDefinition square(int side, const MeasuredTextile& textile) {
-  SheetDefinition sheet = testing::flat_sheet(side, side, 1.0 / (side - 1));
+SheetDefinition square(int side, const MeasuredTextile& textile, bool triangles = false) {
+  const double spacing = 1.0 / (side - 1);
+  SheetDefinition sheet = testing::flat_sheet(side, side, spacing);
+  if (triangles)
+    sheet.shape = complete(triangle_mesh(cut_rectangle(Cut::kIrregular, 1, 1, spacing)));
   sheet.textile.model = textile;
   sheet.skin = 0.003;
   return sheet;
@@ -47,8 +51,8 @@ void bend(SheetDefinition& sheet, double x, double z, double height) {
   sheet.start_positions = testing::values(start);
 }
 
-Scene hang(int side) {
-  SheetDefinition sheet = square(side, kWool);
+Scene hang(int side, bool triangles) {
+  SheetDefinition sheet = square(side, kWool, triangles);
   sheet.pins = {{{0, side - 1}, {}}};
   bend(sheet, 0.99, 1, 0.03);
   Scene scene;
@@ -65,8 +69,8 @@ Scene buckle(int side) {
   return scene;
 }
 
-Scene flag(int side) {
-  SheetDefinition sheet = square(side, kWool);
+Scene flag(int side, bool triangles) {
+  SheetDefinition sheet = square(side, kWool, triangles);
   Pin pole;
   for (int row = 0; row < side; ++row) pole.particles.push_back(row * side);
   sheet.pins = {pole};
@@ -80,8 +84,8 @@ Scene flag(int side) {
 }
 
 // Falls from 15 mm above a body, a little beside its middle.
-Scene fall(int side, const Collider& body, double top) {
-  SheetDefinition sheet = square(side, kWool);
+Scene fall(int side, const Collider& body, double top, bool triangles) {
+  SheetDefinition sheet = square(side, kWool, triangles);
   sheet.origin = {-0.48, top + 0.015, -0.51};
   bend(sheet, 0.999, 0.999, 0.01);
   Scene scene;
@@ -108,13 +112,14 @@ Scene taut(int side) {
   return scene;
 }
 
-Scene scene_of(const std::string& name, int side) {
-  if (name == "hang") return hang(side);
+Scene scene_of(const std::string& name, int side, bool triangles) {
+  if (name == "hang") return hang(side, triangles);
   if (name == "buckle") return buckle(side);
-  if (name == "flag") return flag(side);
-  if (name == "sphere") return fall(side, {"ball", Sphere{{0, 0.3, 0}, 0.3}, 0.3, {}}, 0.6);
+  if (name == "flag") return flag(side, triangles);
+  if (name == "sphere")
+    return fall(side, {"ball", Sphere{{0, 0.3, 0}, 0.3}, 0.3, {}}, 0.6, triangles);
   if (name == "box")
-    return fall(side, {"table", Box{{0, 0.2, 0}, {0.25, 0.2, 0.25}}, 0.3, {}}, 0.4);
+    return fall(side, {"table", Box{{0, 0.2, 0}, {0.25, 0.2, 0.25}}, 0.3, {}}, 0.4, triangles);
   if (name == "taut") return taut(side);
   throw std::invalid_argument("no scene " + name);
 }
@@ -132,7 +137,7 @@ Simulation begin(const Case& given, const Setting& setting, const BendingLaw& la
   return Simulation(std::move(scene));
 }
 Simulation begin(const Case& given, const Setting& setting) {
-  return begin(given, setting, setting.law);
+  return begin(given, setting, given.triangles ? BendingLaw(Isometric{}) : setting.law);
 }
 
 Outcome run(Simulation simulation, int frames) {
@@ -153,13 +158,26 @@ Outcome run(Simulation simulation, int frames) {
 
 std::string Case::title() const { return fmt::format("{0}, {1} x {1}", name, side); }
 
-Case make_case(const std::string& name, int side, double damping) {
-  Case made{name, side, scene_of(name, side), 0, name == "taut"};
+namespace {
+
+Case planned(Case made, double damping) {
   made.scene.sheets[0].textile.damping = damping;
   if (const auto problems = find_problems(made.scene); !problems.empty())
     throw std::invalid_argument(problems[0].field + ": " + problems[0].message);
   made.substeps = Simulation(made.scene).plan().step.substeps;
   return made;
+}
+
+}  // namespace
+
+Case make_case(const std::string& name, int side, double damping) {
+  return planned({name, side, scene_of(name, side, false), 0, name == "taut"}, damping);
+}
+
+Case make_triangle_case(const std::string& name, int side) {
+  Case made{name + " of triangles", side, scene_of(name, side, true), 0, false, true};
+  made.scene.sheets[0].bending = Isometric{};
+  return planned(std::move(made), kDamping);
 }
 
 std::string evaluator_name(const ChoiKo& law) {
@@ -198,7 +216,7 @@ Outcome run(const Case& given, const Setting& setting, int frames) {
 Outcome run(const Case& given, Accuracy accuracy, int frames) {
   Scene scene = given.scene;
   scene.solver = default_settings(accuracy);
-  scene.sheets[0].bending = default_bending(accuracy);
+  if (!given.triangles) scene.sheets[0].bending = default_bending(accuracy);
   return run(Simulation(std::move(scene)), frames);
 }
 

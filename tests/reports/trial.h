@@ -25,6 +25,7 @@ struct Case {
   Scene scene;                // frame step 1/60 s
   std::int64_t substeps = 0;  // of a frame, as planned for the defaults
   bool smooth = false;        // no connection switches, nothing is touched
+  bool triangles = false;     // isometric, whatever a setting says of bending
 
   std::string title() const;
 };
@@ -34,6 +35,8 @@ inline constexpr double kDamping = 2e-2;
 
 // hang, buckle, flag, sphere, box, and taut, the smooth one.
 Case make_case(const std::string& name, int side, double damping = kDamping);
+// hang, flag, sphere or box on triangles between moved points of that lattice.
+Case make_triangle_case(const std::string& name, int side);
 
 // How a case is computed.
 struct Setting {

@@ -1,7 +1,6 @@
 #include <gmock/gmock.h>
 #include <hwy/targets.h>
 
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -232,16 +231,6 @@ TEST_P(Kernels, GiveTheSameBitsInAnyNumberOfBands) {
 
 INSTANTIATE_TEST_SUITE_P(Sheets, Kernels, ::testing::ValuesIn(kFeatures),
                          [](const auto& feature) { return std::string(feature.param.name); });
-
-// FNV-1a over the bits of all values.
-std::uint64_t hash_of(const Matrix3Xd& values) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const double value : values.reshaped()) {
-    hash ^= std::bit_cast<std::uint64_t>(value);
-    hash *= 0x100000001b3u;
-  }
-  return hash;
-}
 
 std::uint64_t hash_of_run(Precision precision, std::int64_t target) {
   hwy::SetSupportedTargetsForTest(target);

@@ -1,5 +1,6 @@
 #include "tests/support/core/scenes.h"
 
+#include <bit>
 #include <random>
 
 namespace weft::testing {
@@ -42,6 +43,15 @@ Matrix3Xd from_planes(const std::vector<double>& planes) {
 }
 
 }  // namespace
+
+std::uint64_t hash_of(const Matrix3Xd& values) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const double value : values.reshaped()) {
+    hash ^= std::bit_cast<std::uint64_t>(value);
+    hash *= 0x100000001b3u;
+  }
+  return hash;
+}
 
 Matrix3Xd positions(const Simulation& simulation) {
   std::vector<double> planes(3 * static_cast<std::size_t>(simulation.particle_count()));

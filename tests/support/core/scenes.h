@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "core/lattice/lattice.h"
 #include "core/simulation.h"
 
@@ -19,6 +21,8 @@ Matrix3Xd noise(int particles, unsigned seed = 1);
 
 // (3 x particles) of one sheet.
 Matrix3Xd positions(const Simulation& simulation);
+// FNV-1a over the bits of all values.
+std::uint64_t hash_of(const Matrix3Xd& values);
 Matrix3Xd velocities(const Simulation& simulation);
 
 // Start positions and velocities in the order of a scene.

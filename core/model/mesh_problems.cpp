@@ -12,6 +12,7 @@ namespace weft {
 namespace {
 
 constexpr std::size_t kMostParticles = std::size_t{4096} * 4096;
+constexpr int kMostAtParticle = 200;               // bending around it costs the square
 constexpr double kFar = 1e4, kLeastHeight = 1e-6;  // m
 
 class MeshCheck {
@@ -164,11 +165,15 @@ class MeshCheck {
   }
 
   void check_used() {
-    std::vector<bool> used(mesh_.start.size());
+    std::vector<int> triangles(mesh_.start.size());
     for (const auto& triangle : mesh_.triangles)
-      for (const int i : triangle) used[static_cast<std::size_t>(i)] = true;
-    for (std::size_t i = 0; i < used.size(); ++i)
-      if (!used[i]) problem("positions_m", "particle ", i, " is in no triangle");
+      for (const int i : triangle) ++triangles[static_cast<std::size_t>(i)];
+    for (std::size_t i = 0; i < triangles.size(); ++i)
+      if (triangles[i] == 0)
+        problem("positions_m", "particle ", i, " is in no triangle");
+      else if (triangles[i] > kMostAtParticle)
+        problem("triangles", "particle ", i, " is a corner of ", triangles[i], " triangles; ",
+                kMostAtParticle, " at most meet in one");
   }
 
   const TriangleMesh& mesh_;

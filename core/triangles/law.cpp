@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -199,12 +200,14 @@ class Halving {
  private:
   void halve(std::size_t begin, std::size_t end) {
     constexpr std::size_t kBlock = TriangleLaw<float>::kBlock;
+    constexpr std::size_t kPatch = kBlock * TriangleLaw<float>::kPatchBlocks;
     if (end - begin <= kBlock) return;
     // from one end, which is farthest from any particle, to the other
     spread(begin, end);
     std::swap(order_[begin], order_[end - 1]);
     spread(begin, end);
-    const std::size_t middle = begin + ((end - begin) / 2 + kBlock - 1) / kBlock * kBlock;
+    const std::size_t unit = end - begin > kPatch ? kPatch : kBlock;
+    const std::size_t middle = begin + ((end - begin) / 2 + unit - 1) / unit * unit;
     halve(begin, middle);
     halve(middle, end);
   }
@@ -232,6 +235,288 @@ class Halving {
   int parts_ = 0;
 };
 
+// Places within a patch.
+class Nearby {
+ public:
+  explicit Nearby(int particles) : place_(index(particles)), patch_(index(particles), -1) {}
+
+  void begin(int patch) {
+    current_ = patch;
+    count_ = 0;
+  }
+  // Whether i was not there yet.
+  bool add(int i) {
+    if (std::exchange(patch_[index(i)], current_) == current_) return false;
+    place_[index(i)] = count_++;
+    return true;
+  }
+  void skip(int count) { count_ += count; }
+  int count() const { return count_; }
+  int at(int i) const {
+    assert(patch_[index(i)] == current_);
+    return place_[index(i)];
+  }
+
+ private:
+  std::vector<int> place_, patch_;
+  int current_ = -1, count_ = 0;
+};
+
+// Puts a sheet into the order in which it is stepped.
+template <class T>
+class Packing {
+ public:
+  Packing(const Mesh& mesh, bool blows)
+      : surface_(mesh.surface),
+        blows_(blows),
+        particles_(static_cast<int>(mesh.mass.size())),
+        corners_(pulling(mesh)),
+        spokes_(spokes_of(particles_, corners_)),
+        near_(neighbours_of(particles_, spokes_, mesh)),
+        bend_(corners_.size(), Vector3d::Zero()),
+        far_(index(particles_)),
+        nearby_(particles_),
+        slot_(corners_.size()),
+        slot_patch_(corners_.size(), -1) {
+    law_.particles = particles_;
+    law_.pushes = surface_.pushes;
+    law_.bends = !surface_.fits.empty();
+    if (law_.bends) find_bending();
+    find_order();
+  }
+
+  std::optional<TriangleLaw<T>> law() {
+    if (!find_patches()) return {};
+    allocate();
+    for (const Patch& patch : law_.patches) fill(patch);
+    return std::move(law_);
+  }
+
+ private:
+  using Law = TriangleLaw<T>;
+  using Patch = typename Law::Patch;
+  using Entry = BendingRows::Entry;
+  static constexpr int kLanes = Law::kLanes, kBlock = Law::kBlock;
+  static constexpr int kStride = 4 * sizeof(T) / 8;  // of a particle, as Near counts
+
+  // Those of the membrane and those that wind presses on are the same.
+  static std::vector<Triangle> pulling(const Mesh& mesh) {
+    if (mesh.surface.membrane.empty()) return mesh.triangles;
+    std::vector<Triangle> corners;
+    for (const MembraneElement& element : mesh.surface.membrane)
+      corners.push_back(element.particle);
+    return corners;
+  }
+
+  // Rows of bending, of which those along edges go to triangles.
+  void find_bending() {
+    BendingRows rows(surface_, particles_);
+    for (int i = 0; i < particles_; ++i)
+      for (const Entry& entry : rows.row(i)) {
+        const auto own = spokes_.at(i);
+        const auto spoke = std::find_if(
+            own.begin(), own.end(), [&](const Spoke& each) { return each.to == entry.particle; });
+        if (spoke == own.end())
+          far_[index(i)].push_back(entry);
+        else if (i < entry.particle)
+          bend_[index(spoke->triangle)][spoke->edge] = entry.stiffness;
+      }
+  }
+  std::size_t reaches(int i) const { return (far_[index(i)].size() + 3) / 4; }
+
+  // In windows, so that loops over neighbours run equally often.
+  void find_order() {
+    order_ = near_order(near_);
+    const auto loops = [&](int i) { return std::pair(near_[index(i)].size(), reaches(i)); };
+    for (std::size_t begin = 0; begin < order_.size(); begin += index(kBlock))
+      std::stable_sort(order_.begin() + static_cast<std::ptrdiff_t>(begin),
+                       order_.begin() + static_cast<std::ptrdiff_t>(
+                                            std::min(order_.size(), begin + index(kBlock))),
+                       [&](int i, int j) { return loops(i) < loops(j); });
+    law_.place.resize(index(particles_));
+    for (int k = 0; k < particles_; ++k) law_.place[index(order_[index(k)])] = k;
+  }
+
+  // Particles of a patch.
+  std::pair<std::size_t, std::size_t> range(const Patch& patch) const {
+    const std::size_t first = index(patch.block * kBlock);
+    return {first, std::min(order_.size(), first + index(patch.blocks * kBlock))};
+  }
+
+  // Begins a patch with its own particles, and calls each with those around them: first those along
+  // edges, whose number it returns.
+  template <class F>
+  std::size_t gather_around(int number, const Patch& patch, const F& each) {
+    nearby_.begin(number);
+    const auto [first, last] = range(patch);
+    for (std::size_t k = first; k < last; ++k) nearby_.add(order_[k]);
+    nearby_.skip(patch.blocks * kBlock - nearby_.count());
+    const int own = nearby_.count();
+    const auto add = [&](int i) {
+      if (nearby_.add(i)) each(i);
+    };
+    for (std::size_t k = first; k < last; ++k)
+      for (const int j : near_[index(order_[k])]) add(j);
+    const int beside = nearby_.count();
+    for (std::size_t k = first; k < last; ++k)
+      for (const Entry& entry : far_[index(order_[k])]) add(entry.particle);
+    return index(beside - own);
+  }
+  // Calls each with the triangles at a patch.
+  template <class F>
+  void gather_triangles(int number, const Patch& patch, const F& each) {
+    const auto [first, last] = range(patch);
+    for (std::size_t k = first; k < last; ++k)
+      for (const Spoke& spoke : spokes_.at(order_[k]))
+        if (std::exchange(slot_patch_[index(spoke.triangle)], number) != number)
+          each(spoke.triangle);
+  }
+
+  bool find_patches() {
+    constexpr int kBlocks = Law::kPatchBlocks;
+    constexpr std::size_t kMost = std::numeric_limits<Near>::max();
+    int number = 0;
+    for (int block = 0; block < law_.blocks(); block += kBlocks, ++number) {
+      Patch patch{block, std::min(kBlocks, law_.blocks() - block)};
+      patch.around = around_.size();
+      patch.group = groups_;
+      patch.side = sides_, patch.reach = reaches_, patch.blown = blown_;
+      patch.beside_count = gather_around(number, patch, [&](int i) {
+        around_.push_back(static_cast<Offset>(4 * law_.place[index(i)]));
+      });
+      std::size_t triangles = 0;
+      gather_triangles(number, patch, [&](int) { ++triangles; });
+      const auto [first, last] = range(patch);
+      for (std::size_t k = first; k < last; ++k) {
+        const int i = order_[k];
+        sides_ += near_[index(i)].size();
+        reaches_ += reaches(i);
+        blown_ += blows_ ? spokes_.at(i).size() / 2 : 0;
+      }
+      patch.around_count = around_.size() - patch.around;
+      patch.group_count = (triangles + index(kLanes) - 1) / index(kLanes);
+      groups_ += patch.group_count;
+      law_.most_particles = std::max(law_.most_particles, index(nearby_.count()));
+      law_.most_groups = std::max(law_.most_groups, patch.group_count);
+      law_.patches.push_back(patch);
+    }
+    return law_.most_particles * kStride <= kMost &&
+           (law_.most_groups * (blows_ ? std::max(3, kStride) : 3) + 1) * kLanes <= kMost;
+  }
+
+  void allocate() {
+    law_.around = AlignedArray<Offset>(around_.size());
+    std::copy(around_.begin(), around_.end(), law_.around.data());
+    law_.corners = AlignedArray<Near>(groups_ * 3 * index(kLanes));
+    law_.stiffness = AlignedArray<T>(groups_ * law_.constants() * index(kLanes));
+    law_.gathers = AlignedArray<Gather<T>>(index(law_.blocks() * kBlock));
+    law_.sides = AlignedArray<Side>(sides_);
+    law_.reaches = AlignedArray<Reaches<T>>(reaches_);
+    law_.blown = AlignedArray<Near>(blown_);
+  }
+
+  Near near(int i) const { return static_cast<Near>(nearby_.at(i) * kStride); }
+
+  void fill(const Patch& patch) {
+    const int number = static_cast<int>(&patch - law_.patches.data() + law_.patches.size());
+    gather_around(number, patch, [](int) {});
+    int triangles = 0;
+    gather_triangles(number, patch, [&](int t) {
+      slot_[index(t)] = triangles;
+      fill_triangle(index(t), patch.group + index(triangles / kLanes), index(triangles % kLanes));
+      ++triangles;
+    });
+    Side* side = law_.sides.data() + patch.side;
+    Reaches<T>* reach = law_.reaches.data() + patch.reach;
+    Near* blown = law_.blown.data() + patch.blown;
+    const auto [first, last] = range(patch);
+    for (std::size_t k = first; k < last; ++k) {
+      const int i = order_[k];
+      Gather<T>& gather = law_.gathers.data()[k];
+      side = fill_sides(i, gather, side);
+      reach = fill_reaches(i, gather, reach);
+      if (blows_) blown = fill_blown(i, gather, blown);
+    }
+  }
+
+  void fill_triangle(std::size_t t, std::size_t group, std::size_t lane) {
+    for (std::size_t k = 0; k < 3; ++k)
+      law_.corners.data()[(group * 3 + k) * index(kLanes) + lane] = near(corners_[t][k]);
+    T* const constants = law_.stiffness.data() + group * law_.constants() * index(kLanes) + lane;
+    if (t < surface_.membrane.size()) {
+      const MembraneElement& element = surface_.membrane[t];
+      set_stiffness(element, surface_.stretch[index(element.panel)], law_.pushes, bend_[t],
+                    constants);
+    } else {
+      for (std::size_t k = 0; k < 3; ++k)
+        constants[(law_.constants() - 3 + k) * index(kLanes)] =
+            static_cast<T>(bend_[t][static_cast<Eigen::Index>(k)]);
+    }
+  }
+
+  // Tensions lie behind a group of zeros.
+  Near tension(const Spoke& spoke) const {
+    const int at = slot_[index(spoke.triangle)];
+    return static_cast<Near>((at / kLanes * 3 + spoke.edge + 1) * kLanes + at % kLanes);
+  }
+
+  Side* fill_sides(int i, Gather<T>& gather, Side* side) {
+    for (const int j : near_[index(i)]) {
+      *side = {near(j), {0, 0}};
+      std::size_t found = 0;
+      for (const Spoke& spoke : spokes_.at(i)) {
+        if (spoke.to != j) continue;
+        assert(found < 2);
+        side->tension[found++] = tension(spoke);
+      }
+      ++side;
+    }
+    gather.sides = static_cast<std::uint16_t>(near_[index(i)].size());
+    return side;
+  }
+
+  Reaches<T>* fill_reaches(int i, Gather<T>& gather, Reaches<T>* reach) {
+    const std::vector<Entry>& far = far_[index(i)];
+    double sum = 0;
+    for (std::size_t n = 0; n < 4 * reaches(i); ++n) {
+      const bool is = n < far.size();
+      const T stiffness = is ? static_cast<T>(far[n].stiffness) : T(0);
+      reach[n / 4].particle[n % 4] = near(is ? far[n].particle : i);
+      reach[n / 4].stiffness[n % 4] = stiffness;
+      sum += double{stiffness};
+    }
+    gather.reach_sum = static_cast<T>(sum);
+    gather.reach_error = static_cast<T>(double{gather.reach_sum} - sum);
+    gather.reaches = static_cast<std::uint16_t>(reaches(i));
+    return reach + reaches(i);
+  }
+
+  Near* fill_blown(int i, Gather<T>& gather, Near* blown) {
+    for (const Spoke& spoke : spokes_.at(i)) {
+      const auto& corner = corners_[index(spoke.triangle)];
+      if (corner[index((spoke.edge + 1) % 3)] != i) continue;  // once of each triangle
+      *blown++ = static_cast<Near>(slot_[index(spoke.triangle)] * kStride);
+      ++gather.corners;
+    }
+    return blown;
+  }
+
+  const Surface& surface_;
+  bool blows_;
+  int particles_;
+  std::vector<Triangle> corners_;
+  Spokes spokes_;
+  std::vector<std::vector<int>> near_;  // particles along edges
+  std::vector<Vector3d> bend_;          // of each triangle, along its edges, N/m
+  std::vector<std::vector<Entry>> far_;
+  std::vector<int> order_;
+  Nearby nearby_;
+  std::vector<int> slot_, slot_patch_;  // of each triangle: its place in a patch
+  std::vector<Offset> around_;
+  std::size_t groups_ = 0, sides_ = 0, reaches_ = 0, blown_ = 0;
+  Law law_;
+};
+
 }  // namespace
 
 std::vector<int> near_order(const std::vector<std::vector<int>>& neighbours) {
@@ -239,151 +524,19 @@ std::vector<int> near_order(const std::vector<std::vector<int>>& neighbours) {
 }
 
 template <class T>
-TriangleLaw<T> make_triangle_law(const Mesh& mesh, bool blows) {
-  constexpr int kLanes = TriangleLaw<T>::kLanes, kBlock = TriangleLaw<T>::kBlock;
-  const int particles = static_cast<int>(mesh.mass.size());
-  const Surface& surface = mesh.surface;
-  TriangleLaw<T> law;
-  law.particles = particles;
-  law.pushes = surface.pushes;
-  law.bends = !surface.fits.empty();
-
-  // those of the membrane and those that wind presses on are the same
-  std::vector<Triangle> corners = mesh.triangles;
-  if (!surface.membrane.empty()) {
-    corners.clear();
-    for (const MembraneElement& element : surface.membrane) corners.push_back(element.particle);
-  }
-  const Spokes spokes = spokes_of(particles, corners);
-  const std::vector<std::vector<int>> near = neighbours_of(particles, spokes, mesh);
-
-  // rows of bending, of which those along edges go to triangles
-  std::vector<Vector3d> bend(corners.size(), Vector3d::Zero());
-  using Entry = BendingRows::Entry;
-  std::vector<std::vector<Entry>> far(index(particles));
-  if (law.bends) {
-    BendingRows rows(surface, particles);
-    for (int i = 0; i < particles; ++i)
-      for (const Entry& entry : rows.row(i)) {
-        const auto own = spokes.at(i);
-        const auto spoke = std::find_if(
-            own.begin(), own.end(), [&](const Spoke& each) { return each.to == entry.particle; });
-        if (spoke == own.end())
-          far[index(i)].push_back(entry);
-        else if (i < entry.particle)
-          bend[index(spoke->triangle)][spoke->edge] = entry.stiffness;
-      }
-  }
-  const auto reaches = [&](int i) { return (far[index(i)].size() + 3) / 4; };
-
-  // order: in windows, so that loops over neighbours run equally often
-  std::vector<int> order = near_order(near);
-  const auto loops = [&](int i) { return std::pair(near[index(i)].size(), reaches(i)); };
-  for (std::size_t begin = 0; begin < order.size(); begin += index(kBlock))
-    std::stable_sort(
-        order.begin() + static_cast<std::ptrdiff_t>(begin),
-        order.begin() + static_cast<std::ptrdiff_t>(std::min(order.size(), begin + index(kBlock))),
-        [&](int i, int j) { return loops(i) < loops(j); });
-  law.place.resize(index(particles));
-  for (int k = 0; k < particles; ++k) law.place[index(order[index(k)])] = k;
-  const auto offset = [&](int i) { return static_cast<Offset>(4 * law.place[index(i)]); };
-
-  // triangles, in order of their first particle
-  std::vector<int> triangles(corners.size());
-  std::iota(triangles.begin(), triangles.end(), 0);
-  const auto first = [&](int t) {
-    const auto& [a, b, c] = corners[index(t)];
-    return std::min({offset(a), offset(b), offset(c)});
-  };
-  std::stable_sort(triangles.begin(), triangles.end(),
-                   [&](int s, int t) { return first(s) < first(t); });
-  law.groups = static_cast<int>((triangles.size() + index(kLanes) - 1) / index(kLanes));
-  const auto groups = index(law.groups);
-  law.corners = AlignedArray<Offset>(groups * 3 * index(kLanes));
-  law.stiffness = AlignedArray<T>(groups * index(law.constants() * kLanes));
-  std::vector<int> slot(triangles.size());
-  for (std::size_t at = 0; at < triangles.size(); ++at) {
-    const auto t = index(triangles[at]);
-    const std::size_t group = at / index(kLanes), lane = at % index(kLanes);
-    slot[t] = static_cast<int>(at);
-    for (std::size_t k = 0; k < 3; ++k)
-      law.corners.data()[(group * 3 + k) * index(kLanes) + lane] = offset(corners[t][k]);
-    T* const constants = law.stiffness.data() + group * index(law.constants() * kLanes) + lane;
-    if (t < surface.membrane.size()) {
-      const MembraneElement& element = surface.membrane[t];
-      set_stiffness(element, surface.stretch[index(element.panel)], law.pushes, bend[t], constants);
-    } else {
-      for (int k = 0; k < 3; ++k)
-        constants[(law.constants() - 3 + k) * kLanes] = static_cast<T>(bend[t][k]);
-    }
-  }
-  const auto tension = [&](const Spoke& spoke) {
-    const int at = slot[index(spoke.triangle)];
-    return static_cast<Offset>((at / kLanes * 3 + spoke.edge) * kLanes + at % kLanes);
-  };
-  const auto none = static_cast<Offset>(groups * 3 * index(kLanes));
-
-  // what each particle gathers
-  std::size_t side_count = 0, reach_count = 0, corner_count = 0;
-  for (int i = 0; i < particles; ++i) {
-    side_count += near[index(i)].size();
-    reach_count += 4 * reaches(i);
-    corner_count += blows ? spokes.at(i).size() / 2 : 0;
-  }
-  law.blocks.resize(index((particles + kBlock - 1) / kBlock));
-  law.gathers = AlignedArray<Gather<T>>(law.blocks.size() * index(kBlock));
-  law.sides = AlignedArray<Side>(side_count);
-  law.reaches = AlignedArray<Reach<T>>(reach_count);
-  law.blown = AlignedArray<Offset>(corner_count);
-  std::size_t side = 0, reach = 0, blown = 0;
-  for (std::size_t k = 0; k < order.size(); ++k) {
-    const int i = order[k];
-    if (k % index(kBlock) == 0) law.blocks[k / index(kBlock)] = {side, reach, blown, 0};
-    Gather<T>& gather = law.gathers.data()[k];
-    for (const int j : near[index(i)]) {
-      Side& made = law.sides.data()[side++] = {offset(j), {none, none}};
-      std::size_t found = 0;
-      for (const Spoke& spoke : spokes.at(i)) {
-        if (spoke.to != j) continue;
-        assert(found < 2);
-        made.tension[found++] = tension(spoke);
-      }
-      ++gather.sides;
-    }
-    double sum = 0;
-    for (const Entry& entry : far[index(i)]) {
-      const T stiffness = static_cast<T>(entry.stiffness);
-      law.reaches.data()[reach++] = {offset(entry.particle), stiffness};
-      sum += double{stiffness};
-    }
-    gather.reach_sum = static_cast<T>(sum);
-    gather.reach_error = static_cast<T>(double{gather.reach_sum} - sum);
-    for (std::size_t n = far[index(i)].size(); n < 4 * reaches(i); ++n)
-      law.reaches.data()[reach++] = {offset(i), T(0)};
-    gather.reaches = static_cast<std::uint32_t>(reaches(i));
-    if (!blows) continue;
-    for (const Spoke& spoke : spokes.at(i)) {
-      const auto& corner = corners[index(spoke.triangle)];
-      if (corner[index((spoke.edge + 1) % 3)] != i) continue;  // once of each triangle
-      law.blown.data()[blown++] = static_cast<Offset>(4 * slot[index(spoke.triangle)]);
-      ++gather.corners;
-    }
-  }
-  for (std::size_t b = 0, at = 0; b < law.blocks.size(); ++b) {
-    while (at < triangles.size() && first(triangles[at]) < 4 * (b + 1) * index(kBlock)) ++at;
-    law.blocks[b].groups = static_cast<int>((at + index(kLanes) - 1) / index(kLanes));
-  }
-  return law;
+std::optional<TriangleLaw<T>> make_triangle_law(const Mesh& mesh, bool blows) {
+  return Packing<T>(mesh, blows).law();
 }
 
 template <class T>
 void TriangleLaw<T>::release() {
-  corners = {}, stiffness = {}, gathers = {}, sides = {}, reaches = {}, blown = {};
+  around = {}, corners = {}, stiffness = {}, gathers = {}, sides = {}, reaches = {}, blown = {};
 }
 
 template <class T>
 void TriangleLaw<T>::restore(const Mesh& mesh) {
-  TriangleLaw<T> made = make_triangle_law<T>(mesh, wind.blows);
+  TriangleLaw<T> made = *make_triangle_law<T>(mesh, wind.blows);
+  std::swap(around, made.around);
   std::swap(corners, made.corners);
   std::swap(stiffness, made.stiffness);
   std::swap(gathers, made.gathers);
@@ -394,7 +547,7 @@ void TriangleLaw<T>::restore(const Mesh& mesh) {
 
 template struct TriangleLaw<float>;
 template struct TriangleLaw<double>;
-template TriangleLaw<float> make_triangle_law(const Mesh&, bool);
-template TriangleLaw<double> make_triangle_law(const Mesh&, bool);
+template std::optional<TriangleLaw<float>> make_triangle_law(const Mesh&, bool);
+template std::optional<TriangleLaw<double>> make_triangle_law(const Mesh&, bool);
 
 }  // namespace weft

@@ -17,13 +17,13 @@ template <class T>
 class TriangleSolver : public SheetSolver {
  public:
   TriangleSolver(const Mesh& mesh, const Dynamics& dynamics, const std::optional<Wind>& wind,
-                 bool compensated)
+                 bool compensated, TriangleLaw<T> law)
       : mesh_(mesh),
         dynamics_(dynamics),
         particles_(static_cast<int>(mesh.mass.size())),
-        law_(make_triangle_law<T>(mesh, wind.has_value())),
+        law_(std::move(law)),
         state_(particles_, compensated),
-        gap_(law_.blocks.size()) {
+        gap_(static_cast<std::size_t>(law_.blocks())) {
     law_.compensated = compensated;
     law_.drags = dynamics.drag.size() > 0;
     if (wind) law_.wind = make_wind_law<T>(*wind);
@@ -257,14 +257,21 @@ class TriangleSolver : public SheetSolver {
   std::vector<int> near_;               // blocks that may touch, in this step
 };
 
+template <class T>
+std::unique_ptr<SheetSolver> make(const Mesh& mesh, const Dynamics& dynamics,
+                                  const std::optional<Wind>& wind, bool compensated) {
+  auto law = make_triangle_law<T>(mesh, wind.has_value());
+  if (!law) return make_plain_solver(dynamics, IntegratorKind::kVerlet);
+  return std::make_unique<TriangleSolver<T>>(mesh, dynamics, wind, compensated, std::move(*law));
+}
+
 }  // namespace
 
 std::unique_ptr<SheetSolver> make_triangle_solver(const Mesh& mesh, const Dynamics& dynamics,
                                                   const std::optional<Wind>& wind,
                                                   const SolverSettings& settings) {
-  if (settings.precision == Precision::kDouble)
-    return std::make_unique<TriangleSolver<double>>(mesh, dynamics, wind, false);
-  return std::make_unique<TriangleSolver<float>>(mesh, dynamics, wind, settings.compensated);
+  if (settings.precision == Precision::kDouble) return make<double>(mesh, dynamics, wind, false);
+  return make<float>(mesh, dynamics, wind, settings.compensated);
 }
 
 }  // namespace weft

@@ -16,22 +16,28 @@
 HWY_BEFORE_NAMESPACE();
 namespace weft::HWY_NAMESPACE {
 
+template <class T>
+HWY_INLINE const T* near(const T* p, Near at) {
+  return p + at * (8 / sizeof(T));
+}
+
 #if HWY_TARGET == HWY_SCALAR
 
-// x, y and z of the particle that begins at p[at[0]].
+// x, y and z of the particle at p + at[0].
 template <class D>
-HWY_INLINE Triple<hn::Vec<D>> pick(D d, const hn::TFromD<D>* p, const Offset* at) {
-  return {hn::Load(d, p + at[0]), hn::Load(d, p + at[0] + 1), hn::Load(d, p + at[0] + 2)};
+HWY_INLINE Triple<hn::Vec<D>> pick(D d, const hn::TFromD<D>* p, const Near* at) {
+  const auto* from = near(p, at[0]);
+  return {hn::Load(d, from), hn::Load(d, from + 1), hn::Load(d, from + 2)};
 }
 
 #else
 
 // Runs of 128 bits at x + at[0], x + at[kApart], ..., side by side.
 template <int kApart, class D>
-HWY_INLINE hn::Vec<D> blocks(D d, const hn::TFromD<D>* x, const Offset* at) {
+HWY_INLINE hn::Vec<D> blocks(D d, const hn::TFromD<D>* x, const Near* at) {
   constexpr std::size_t kBlocks = hn::MaxLanes(D()) * sizeof(hn::TFromD<D>) / 16;
   if constexpr (kBlocks == 1) {
-    return hn::Load(d, x + at[0]);
+    return hn::Load(d, near(x, at[0]));
   } else {
     const hn::Half<D> half;
     return hn::Combine(d, blocks<kApart>(half, x, at + kApart * (kBlocks / 2)),
@@ -39,9 +45,9 @@ HWY_INLINE hn::Vec<D> blocks(D d, const hn::TFromD<D>* x, const Offset* at) {
   }
 }
 
-// x, y and z of the particles that begin at p[at[0]], p[at[1]], ...
+// x, y and z of the particles at p + at[0], p + at[1], ...
 template <class D>
-HWY_INLINE Triple<hn::Vec<D>> pick(D d, const hn::TFromD<D>* p, const Offset* at) {
+HWY_INLINE Triple<hn::Vec<D>> pick(D d, const hn::TFromD<D>* p, const Near* at) {
   if constexpr (sizeof(hn::TFromD<D>) == 8) {  // two in 128 bits: x and y, z and 0
     const auto even = blocks<2>(d, p, at), odd = blocks<2>(d, p, at + 1);
     return {hn::InterleaveLower(d, even, odd), hn::InterleaveUpper(d, even, odd),
@@ -64,26 +70,28 @@ HWY_INLINE void fetch(const A* from, std::ptrdiff_t ahead) {
     __builtin_prefetch(reinterpret_cast<const char*>(from) + ahead + 64 * k, 0, 2);
 }
 
-// Tensions, and what wind does, of the groups of triangles first ... last - 1.
+// Tensions, and what wind does, of the triangles of a patch.
 template <bool kPushes, bool kBlows, class T>
-void strain_groups(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last) {
+void strain_patch(const TriangleLaw<T>& law, const typename TriangleLaw<T>::Patch& patch,
+                  typename TriangleState<T>::PatchCopy& copy) {
   using D = hn::ScalableTag<T>;
   using V = hn::Vec<D>;
   const D d;
-  constexpr int kLanes = TriangleLaw<T>::kLanes, kPart = static_cast<int>(hn::MaxLanes(D()));
-  constexpr int kConstants = kPushes ? 9 : 15;
-  const T* const x = state.x.data();
-  for (int group = first; group < last; ++group) {
-    for (int part = 0; part < kLanes; part += kPart) {
-      const Offset* const at = law.corners.data() + group * 3 * kLanes + part;
-      const T* const constants = law.stiffness.data() + group * kConstants * kLanes + part;
-      T* const tensions = state.tension.data() + group * 3 * kLanes + part;
+  constexpr std::size_t kLanes = TriangleLaw<T>::kLanes, kPart = hn::MaxLanes(D());
+  constexpr std::size_t kConstants = kPushes ? 9 : 15;
+  const T *const x = copy.x.data(), *const w = copy.w.data();
+  for (std::size_t group = 0; group < patch.group_count; ++group) {
+    for (std::size_t part = 0; part < kLanes; part += kPart) {
+      const std::size_t from = patch.group + group;
+      const Near* const at = law.corners.data() + from * 3 * kLanes + part;
+      const T* const constants = law.stiffness.data() + from * kConstants * kLanes + part;
+      T* const tensions = copy.tension.data() + (group * 3 + 1) * kLanes + part;
       if (part == 0) {
         fetch<kConstants>(constants, 2 * kConstants * 64);
-        fetch<3>(at, 2 * 3 * 64);
+        fetch<2>(at, 2 * 3 * 32);
       }
-      const auto c = [&](int k) HWY_ATTR { return hn::Load(d, constants + k * kLanes); };
-      const auto put = [&](int k, V v) HWY_ATTR { hn::Store(v, d, tensions + k * kLanes); };
+      const auto c = [&](std::size_t k) HWY_ATTR { return hn::Load(d, constants + k * kLanes); };
+      const auto put = [&](std::size_t k, V v) HWY_ATTR { hn::Store(v, d, tensions + k * kLanes); };
 
       const Triple<V> a = pick(d, x, at), b = pick(d, x, at + kLanes);
       const Triple<V> e = pick(d, x, at + 2 * kLanes);
@@ -100,13 +108,12 @@ void strain_groups(const TriangleLaw<T>& law, TriangleState<T>& state, int first
         const V warp = hn::Max(hn::Zero(d), sum(c(0), c(1), c(2), c(3)));
         const V weft = hn::Max(hn::Zero(d), sum(c(4), c(5), c(6), c(7)));
         const V shear = sum(c(8), c(9), c(10), c(11));
-        for (int k = 0; k < 3; ++k)
+        for (std::size_t k = 0; k < 3; ++k)
           put(k, hn::MulAdd(warp, c(k),
                             hn::MulAdd(weft, c(4 + k), hn::MulSub(shear, c(8 + k), c(12 + k)))));
       }
 
       if constexpr (kBlows) {
-        const T* const w = state.w.data();
         const Triple<V> three_w =
             plus(plus(pick(d, w, at), pick(d, w, at + kLanes)), pick(d, w, at + 2 * kLanes));
         const Triple<V> cross = product(minus(b, a), minus(e, a));
@@ -114,7 +121,7 @@ void strain_groups(const TriangleLaw<T>& law, TriangleState<T>& state, int first
         const Triple<V> push =
             blow(d, law.wind, cross, square, inverse_sqrt(d, Each<V, 1>{square})[0], three_w);
         hn::StoreInterleaved4(push.x, push.y, push.z, hn::Zero(d), d,
-                              state.wind.data() + 4 * (group * kLanes + part));
+                              copy.wind.data() + 4 * (group * kLanes + part));
       }
     }
   }
@@ -160,40 +167,49 @@ struct Quad {
   }
 };
 
-// Sums the forces on the particles of a block.
+// Where the next particle finds what it gathers.
+template <class T>
+struct Gathering {
+  const Side* side;
+  const Reaches<T>* reach;
+  const Near* blown;
+};
+
+// Sums the forces on the particles of a block, which is so many after the first of its patch.
 template <bool kBends, bool kDamps, bool kBlows, class T>
-HWY_INLINE void gather_block(const TriangleLaw<T>& law, const TriangleState<T>& state,
-                             std::size_t block, T* HWY_RESTRICT force) {
+HWY_INLINE void gather_block(const TriangleLaw<T>& law,
+                             const typename TriangleState<T>::PatchCopy& copy, std::size_t block,
+                             std::size_t after, Gathering<T>& next, T* HWY_RESTRICT force) {
   using Q = Quad<T>;
   constexpr std::size_t kBlock = TriangleLaw<T>::kBlock;
-  const T *const x = state.x.data(), *const w = state.w.data();
-  const T *const tension = state.tension.data(), *const wind = state.wind.data();
-  const auto& from = law.blocks[block];
+  const T *const x = copy.x.data(), *const w = copy.w.data();
+  const T *const tension = copy.tension.data(), *const wind = copy.wind.data();
   const Gather<T>* gather = law.gathers.data() + block * kBlock;
-  const Side* side = law.sides.data() + from.side;
-  const Reach<T>* reach = law.reaches.data() + from.reach;
-  const Offset* blown = law.blown.data() + from.blown;
-  for (std::size_t i = 4 * block * kBlock; i < 4 * (block + 1) * kBlock; i += 4, ++gather) {
-    fetch<2>(side, 1024);
-    if constexpr (kBends) fetch<3>(reach, 2048);
+  const Side* side = next.side;
+  const Reaches<T>* reach = next.reach;
+  const Near* blown = next.blown;
+  const std::size_t first = 4 * after * kBlock;
+  for (std::size_t i = first; i < first + 4 * kBlock; i += 4, ++gather) {
+    fetch<1>(side, 1024);
+    if constexpr (kBends) fetch<2>(reach, 2048);
     const Q here = Q::load(x + i);
     Q pull = Q::zero(), speed = Q::zero();
 
     // membrane along edges, and damping (eq. 7)
-    for (std::uint32_t k = 0; k < gather->sides; ++k, ++side) {
+    for (int k = 0; k < gather->sides; ++k, ++side) {
       pull.add(tension[side->tension[0]] + tension[side->tension[1]],
-               Q::apart(x + side->particle, here));
-      if constexpr (kDamps) speed.add(Q::load(w + side->particle));
+               Q::apart(near(x, side->particle), here));
+      if constexpr (kDamps) speed.add(Q::load(near(w, side->particle)));
     }
 
     // bending by particles farther away: two sums, so that one need not wait for the other
     if constexpr (kBends) {
       Q even = Q::zero(), odd = Q::zero();
-      for (std::uint32_t k = 0; k < gather->reaches; ++k, reach += 4) {
-        even.subtract(reach[0].stiffness, Q::load(x + reach[0].particle));
-        odd.subtract(reach[1].stiffness, Q::load(x + reach[1].particle));
-        even.subtract(reach[2].stiffness, Q::load(x + reach[2].particle));
-        odd.subtract(reach[3].stiffness, Q::load(x + reach[3].particle));
+      for (int k = 0; k < gather->reaches; ++k, ++reach) {
+        even.subtract(reach->stiffness[0], Q::load(near(x, reach->particle[0])));
+        odd.subtract(reach->stiffness[1], Q::load(near(x, reach->particle[1])));
+        even.subtract(reach->stiffness[2], Q::load(near(x, reach->particle[2])));
+        odd.subtract(reach->stiffness[3], Q::load(near(x, reach->particle[3])));
       }
       even.add(gather->reach_sum, here);
       odd.subtract(gather->reach_error, here);
@@ -205,9 +221,10 @@ HWY_INLINE void gather_block(const TriangleLaw<T>& law, const TriangleState<T>& 
       pull.add(law.damping, speed);
     }
     if constexpr (kBlows)
-      for (std::uint32_t k = 0; k < gather->corners; ++k, ++blown) pull.add(Q::load(wind + *blown));
-    pull.store(force + i - 4 * block * kBlock);
+      for (int k = 0; k < gather->corners; ++k, ++blown) pull.add(Q::load(near(wind, *blown)));
+    pull.store(force + i - first);
   }
+  next = {side, reach, blown};
 }
 
 // Eq. 7 and 8 for the particles of a block: drag centred, Verlet in summed form.
@@ -248,9 +265,26 @@ HWY_INLINE void move_block(D d, const TriangleLaw<T>& law, TriangleState<T>& sta
   }
 }
 
+// Copies the particles of a patch, and those around them, to where they are near.
+template <class T>
+void bring(const TriangleLaw<T>& law, const typename TriangleLaw<T>::Patch& patch,
+           std::size_t around_count, const AlignedArray<T>& plane, AlignedArray<T>& copy) {
+  constexpr std::size_t kValues = 4 * TriangleLaw<T>::kBlock;
+  const hn::ScalableTag<T> d;
+  const T* const from = plane.data() + static_cast<std::size_t>(patch.block) * kValues;
+  const std::size_t own = static_cast<std::size_t>(patch.blocks) * kValues;
+  for (std::size_t i = 0; i < own; i += hn::Lanes(d))
+    hn::Store(hn::Load(d, from + i), d, copy.data() + i);
+  T* to = copy.data() + own;
+  const Offset* const around = law.around.data() + patch.around;
+  for (std::size_t k = 0; k < around_count; ++k, to += 4)
+    Quad<T>::load(plane.data() + around[k]).store(to);
+}
+
 template <bool kBends, bool kDamps, bool kBlows, class T>
-void move_blocks(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last,
-                 Farthest<T>& farthest) {
+void move_patch(const TriangleLaw<T>& law, TriangleState<T>& state,
+                const typename TriangleLaw<T>::Patch& patch,
+                const typename TriangleState<T>::PatchCopy& copy, Farthest<T>& farthest) {
   using D = hn::ScalableTag<T>;
   const D d;
   constexpr std::size_t kMost = TriangleLaw<T>::kLanes;
@@ -258,59 +292,59 @@ void move_blocks(const TriangleLaw<T>& law, TriangleState<T>& state, int first, 
   HWY_ALIGN T drift[kMost], air[kMost], reached[kMost] = {};
   for (std::size_t k = 0; k < kMost; ++k) drift[k] = law.drift[k % 4], air[k] = law.air[k % 4];
   auto largest = hn::Zero(d);
-  for (auto block = static_cast<std::size_t>(first); block < static_cast<std::size_t>(last);
-       ++block) {
-    gather_block<kBends, kDamps, kBlows>(law, state, block, force);
+  Gathering<T> next{law.sides.data() + patch.side, law.reaches.data() + patch.reach,
+                    law.blown.data() + patch.blown};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(patch.blocks); ++k) {
+    const std::size_t block = static_cast<std::size_t>(patch.block) + k;
+    gather_block<kBends, kDamps, kBlows>(law, copy, block, k, next, force);
     move_block(d, law, state, block, force, hn::Load(d, drift), hn::Load(d, air), largest);
   }
   hn::Store(largest, d, reached);
   for (std::size_t k = 0; k < kMost; ++k) farthest[k % 4] = std::max(farthest[k % 4], reached[k]);
 }
 
-template <class T>
-void strain_groups_of(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last) {
-  const auto run = [&](auto pushes, auto blows) {
-    strain_groups<decltype(pushes)::value, decltype(blows)::value>(law, state, first, last);
-  };
-  const std::true_type on;
-  const std::false_type off;
-  if (law.wind.blows)
-    law.pushes ? run(on, on) : run(off, on);
-  else
-    law.pushes ? run(on, off) : run(off, off);
+// One substep of the patches first ... last - 1.
+template <bool kPushes, bool kBends, bool kDamps, bool kBlows, class T>
+void step_patches(const TriangleLaw<T>& law, TriangleState<T>& state, std::size_t first,
+                  std::size_t last, typename TriangleState<T>::PatchCopy& copy,
+                  Farthest<T>& farthest) {
+  for (std::size_t p = first; p < last; ++p) {
+    const auto& patch = law.patches[p];
+    bring(law, patch, patch.around_count, state.x, copy.x);
+    if constexpr (kDamps || kBlows) bring(law, patch, patch.beside_count, state.w, copy.w);
+    strain_patch<kPushes, kBlows>(law, patch, copy);
+    move_patch<kBends, kDamps, kBlows>(law, state, patch, copy, farthest);
+  }
 }
 
 template <class T>
-void move_blocks_of(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last,
-                    Farthest<T>& farthest) {
-  const auto with = [&](auto bends, auto damps, auto blows) {
-    move_blocks<decltype(bends)::value, decltype(damps)::value, decltype(blows)::value>(
-        law, state, first, last, farthest);
-  };
+void step(const TriangleLaw<T>& law, TriangleState<T>& state, std::size_t first, std::size_t last,
+          typename TriangleState<T>::PatchCopy& copy, Farthest<T>& farthest) {
   const std::true_type on;
   const std::false_type off;
-  const auto damped = [&](auto bends, auto damps) {
-    law.wind.blows ? with(bends, damps, on) : with(bends, damps, off);
+  const auto with = [&](auto pushes, auto bends, auto damps, auto blows) {
+    step_patches<decltype(pushes)::value, decltype(bends)::value, decltype(damps)::value,
+                 decltype(blows)::value>(law, state, first, last, copy, farthest);
   };
-  const auto bent = [&](auto bends) { law.damping > 0 ? damped(bends, on) : damped(bends, off); };
-  law.bends ? bent(on) : bent(off);
+  const auto damped = [&](auto pushes, auto bends, auto damps) {
+    law.wind.blows ? with(pushes, bends, damps, on) : with(pushes, bends, damps, off);
+  };
+  const auto bent = [&](auto pushes, auto bends) {
+    law.damping > 0 ? damped(pushes, bends, on) : damped(pushes, bends, off);
+  };
+  const auto pushed = [&](auto pushes) { law.bends ? bent(pushes, on) : bent(pushes, off); };
+  law.pushes ? pushed(on) : pushed(off);
 }
 
-void strain_single(const TriangleLaw<float>& law, TriangleState<float>& state, int first,
-                   int last) {
-  strain_groups_of(law, state, first, last);
-}
-void strain_double(const TriangleLaw<double>& law, TriangleState<double>& state, int first,
-                   int last) {
-  strain_groups_of(law, state, first, last);
-}
-void move_single(const TriangleLaw<float>& law, TriangleState<float>& state, int first, int last,
+void step_single(const TriangleLaw<float>& law, TriangleState<float>& state, std::size_t first,
+                 std::size_t last, TriangleState<float>::PatchCopy& copy,
                  Farthest<float>& farthest) {
-  move_blocks_of(law, state, first, last, farthest);
+  step(law, state, first, last, copy, farthest);
 }
-void move_double(const TriangleLaw<double>& law, TriangleState<double>& state, int first, int last,
+void step_double(const TriangleLaw<double>& law, TriangleState<double>& state, std::size_t first,
+                 std::size_t last, TriangleState<double>::PatchCopy& copy,
                  Farthest<double>& farthest) {
-  move_blocks_of(law, state, first, last, farthest);
+  step(law, state, first, last, copy, farthest);
 }
 
 }  // namespace weft::HWY_NAMESPACE
@@ -319,36 +353,18 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace weft {
 
-HWY_EXPORT(strain_single);
-HWY_EXPORT(strain_double);
-HWY_EXPORT(move_single);
-HWY_EXPORT(move_double);
+HWY_EXPORT(step_single);
+HWY_EXPORT(step_double);
 
 namespace {
 
 template <class T>
-void strain(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last) {
+void step(const TriangleLaw<T>& law, TriangleState<T>& state, std::size_t first, std::size_t last,
+          typename TriangleState<T>::PatchCopy& copy, Farthest<T>& farthest) {
   if constexpr (sizeof(T) == 4)
-    HWY_DYNAMIC_DISPATCH(strain_single)(law, state, first, last);
+    HWY_DYNAMIC_DISPATCH(step_single)(law, state, first, last, copy, farthest);
   else
-    HWY_DYNAMIC_DISPATCH(strain_double)(law, state, first, last);
-}
-template <class T>
-void move(const TriangleLaw<T>& law, TriangleState<T>& state, int first, int last,
-          Farthest<T>& farthest) {
-  if constexpr (sizeof(T) == 4)
-    HWY_DYNAMIC_DISPATCH(move_single)(law, state, first, last, farthest);
-  else
-    HWY_DYNAMIC_DISPATCH(move_double)(law, state, first, last, farthest);
-}
-
-// Calls part(band, first, last) for so many shares of `count`.
-template <class F>
-void share(int count, int bands, ThreadPool& pool, const F& part) {
-  const auto at = [&](int band) {
-    return static_cast<int>(static_cast<std::int64_t>(count) * band / bands);
-  };
-  pool.run(bands, [&](int band) { part(band, at(band), at(band + 1)); });
+    HWY_DYNAMIC_DISPATCH(step_double)(law, state, first, last, copy, farthest);
 }
 
 }  // namespace
@@ -364,41 +380,39 @@ TriangleState<T>::TriangleState(int particles, bool compensated) {
 
 template <class T>
 void TriangleState<T>::release_memory() {
-  for (auto* plane : {&step2, &drag, &next_x, &next_w, &tension, &wind}) *plane = {};
+  for (auto* plane : {&step2, &drag, &next_x, &next_w}) *plane = {};
+  copies.clear();
 }
 
 template <class T>
 void TriangleState<T>::prepare(const TriangleLaw<T>& law) {
   if (next_x.size() > 0) return;
-  const auto triangles = static_cast<std::size_t>(law.groups) * TriangleLaw<T>::kLanes;
   step2 = AlignedArray<T>(size());
   if (law.drags) drag = AlignedArray<T>(size());
-  if (law.wind.blows) wind = AlignedArray<T>(4 * triangles);
-  tension = AlignedArray<T>(3 * triangles + 1);
   next_w = AlignedArray<T>(size());
   next_x = AlignedArray<T>(size());
 }
 
 template <class T>
 T sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool) {
-  const int blocks = static_cast<int>(law.blocks.size());
-  std::vector<Farthest<T>> farthest(static_cast<std::size_t>(bands));
-  if (bands == 1) {
-    // no triangle comes before its first particle: what is strained is still in cache when it pulls
-    constexpr int kRun = 16;
-    for (int first = 0, strained = 0; first < blocks; first += kRun) {
-      const int last = std::min(first + kRun, blocks);
-      const int groups = law.blocks[static_cast<std::size_t>(last - 1)].groups;
-      strain(law, state, std::exchange(strained, groups), groups);
-      move(law, state, first, last, farthest.front());
-    }
-  } else {
-    share(law.groups, bands, pool,
-          [&](int, int first, int last) { strain(law, state, first, last); });
-    share(blocks, bands, pool, [&](int band, int first, int last) {
-      move(law, state, first, last, farthest[static_cast<std::size_t>(band)]);
-    });
+  constexpr std::size_t kLanes = TriangleLaw<T>::kLanes;
+  const auto count = static_cast<std::size_t>(bands);
+  while (state.copies.size() < count) {
+    const std::size_t particles = 4 * law.most_particles, triangles = law.most_groups * kLanes;
+    state.copies.push_back({AlignedArray<T>(particles), AlignedArray<T>(particles),
+                            AlignedArray<T>(3 * triangles + kLanes),
+                            AlignedArray<T>(law.wind.blows ? 4 * triangles : 0)});
   }
+  std::vector<Farthest<T>> farthest(count);
+  const auto share = [&](int band) {
+    const auto k = static_cast<std::size_t>(band);
+    const auto at = [&](std::size_t n) { return law.patches.size() * n / count; };
+    step(law, state, at(k), at(k + 1), state.copies[k], farthest[k]);
+  };
+  if (bands == 1)
+    share(0);
+  else
+    pool.run(bands, share);
   std::swap(state.x, state.next_x);
   std::swap(state.w, state.next_w);
 

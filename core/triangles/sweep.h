@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <vector>
+
 #include "core/triangles/law.h"
 
 namespace weft {
@@ -18,9 +21,14 @@ struct TriangleState {
   // What follows from mass, drag and the step.
   AlignedArray<T> step2;  // dt^2 / mass, s^2/kg; 0 holds a particle
   AlignedArray<T> drag;   // c dt / m; or empty
-  // What only sweeps need: the next x and w, tensions (groups x 3 x kLanes, then a 0), forces of
-  // wind on a triangle's corners.
-  AlignedArray<T> next_x, next_w, tension, wind;
+  // What only sweeps need: the next x and w.
+  AlignedArray<T> next_x, next_w;
+  // A patch at work: its particles and those around them, tensions (a group of 0, then groups x 3 x
+  // kLanes), pushes of wind on a triangle's corners. One for each band.
+  struct PatchCopy {
+    AlignedArray<T> x, w, tension, wind;
+  };
+  std::vector<PatchCopy> copies;
   // Lets go of these, until they are prepared; step2 and drag are then to be set.
   void release_memory();
   void prepare(const TriangleLaw<T>& law);
@@ -32,7 +40,7 @@ struct TriangleState {
 template <class T>
 using Farthest = std::array<T, 4>;
 
-// One substep of all triangles, then of all particles. Equal bits on every processor with FMA, and
+// One substep. Equal bits on every processor with FMA, and
 // for every number of bands. Returns a bound of the largest displacement where law.measured, m.
 template <class T>
 T sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool);

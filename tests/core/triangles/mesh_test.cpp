@@ -150,6 +150,20 @@ TEST(Meshes, PanelsOfOneTextileSewnWithTurnedGrainBendAsOnePiece) {
   EXPECT_NEAR(energy_of(two) / energy_of(one), 1, 1e-9);
 }
 
+// Triangles around one particle, side by side.
+TriangleMesh disc_of(int triangles) {
+  TriangleMesh mesh;
+  mesh.flat.emplace_back(0, 0);
+  for (int k = 0; k < triangles; ++k) {
+    const double angle = 2 * std::numbers::pi * k / triangles;
+    mesh.flat.emplace_back(std::cos(angle), std::sin(angle));
+    mesh.triangles.push_back({0, k + 1, (k + 1) % triangles + 1});
+  }
+  for (const Vector2d& flat : mesh.flat) mesh.start.emplace_back(flat.y(), 0, flat.x());
+  mesh.panels = {{"disc", triangles}};
+  return mesh;
+}
+
 TEST(Meshes, FaultsOfTrianglesAreNamedWithTheirPlace) {
   const auto problems = [](const std::function<void(TriangleMesh&)>& spoil) {
     TriangleMesh mesh = triangle_mesh(square(Cut::kRight, 0.1, 0.05));
@@ -184,6 +198,9 @@ TEST(Meshes, FaultsOfTrianglesAreNamedWithTheirPlace) {
                      m.flat.emplace_back(0, 0);
                    }),
                    "mesh.positions_m: particle 9 is in no triangle"));
+  EXPECT_TRUE(says(problems([](TriangleMesh& m) { m = disc_of(201); }),
+                   "mesh.triangles: particle 0 is a corner of 201 triangles; 200 at most meet"));
+  EXPECT_TRUE(problems([](TriangleMesh& m) { m = disc_of(200); }).empty());
   EXPECT_TRUE(says(problems([](TriangleMesh& m) {
                      m.panels = {{"front", 3}};
                    }),

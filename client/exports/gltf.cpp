@@ -240,22 +240,24 @@ class GltfWriter : public FrameWriter {
     }
     Json attributes = shapes[0];
     attributes.update(flat_shape);
-    Json primitives = Json::array();
+    // a material for each panel: what tools that join primitives tell them apart by
+    Json primitives = Json::array(), materials = Json::array();
     for (std::size_t i = 0; i < indices.size(); ++i) {
-      primitives.push_back({{"attributes", attributes}, {"indices", indices[i]}, {"material", 0}});
+      primitives.push_back({{"attributes", attributes}, {"indices", indices[i]}, {"material", i}});
       const std::string& panel = drawing_.primitives[i].panel;
+      materials.push_back({{"name", panel.empty() ? "cloth" : panel},
+                           {"doubleSided", true},
+                           {"pbrMetallicRoughness",
+                            {{"baseColorFactor", {0.6, 0.1, 0.05, 1}},
+                             {"metallicFactor", 0},
+                             {"roughnessFactor", 0.9}}}});
       if (!panel.empty()) primitives.back()["extras"] = {{"panel", panel}};
     }
     Json json{{"asset", {{"version", "2.0"}, {"generator", "weft " WEFT_VERSION}}},
               {"scene", 0},
               {"scenes", {{{"nodes", {0}}}}},
               {"nodes", {{{"mesh", 0}, {"name", "cloth"}}}},
-              {"materials",
-               {{{"doubleSided", true},
-                 {"pbrMetallicRoughness",
-                  {{"baseColorFactor", {0.6, 0.1, 0.05, 1}},
-                   {"metallicFactor", 0},
-                   {"roughnessFactor", 0.9}}}}}}};
+              {"materials", std::move(materials)}};
     if (frames > 1) {
       shapes.erase(0);
       for (Json& primitive : primitives) primitive["targets"] = shapes;

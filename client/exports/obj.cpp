@@ -42,7 +42,7 @@ void add_triangles(std::string& text, const SheetMesh& sheet, const Points& poin
   for (std::size_t i = first; i < first + count; ++i)
     fmt::format_to(std::back_inserter(text), "vn {:.6g}\n", fmt::join(normals[i], " "));
   for (const PanelRun& panel : sheet.panels) {
-    text += "g " + panel.name + '\n';
+    text += "g " + panel.name + "\nusemtl " + panel.name + '\n';
     for (std::size_t t = panel.first; t < panel.first + panel.count; ++t) {
       text += 'f';
       for (std::size_t k = 0; k < 3; ++k) {

@@ -11,8 +11,8 @@ namespace {
 constexpr int kBlockTriangles = 32;  // at most
 
 // Halves triangles across the longer side until they are few enough for a block.
-void divide(std::span<int> triangles, const std::vector<Vector3d>& centers,
-            std::vector<std::size_t>& sizes) {
+void divide_block(std::span<int> triangles, const std::vector<Vector3d>& centers,
+                  std::vector<std::size_t>& sizes) {
   if (triangles.size() <= kBlockTriangles) {
     sizes.push_back(triangles.size());
     return;
@@ -30,8 +30,8 @@ void divide(std::span<int> triangles, const std::vector<Vector3d>& centers,
                      const double a = center(s)[axis], b = center(t)[axis];
                      return a < b || (a == b && s < t);
                    });
-  divide(triangles.first(half), centers, sizes);
-  divide(triangles.subspan(half), centers, sizes);
+  divide_block(triangles.first(half), centers, sizes);
+  divide_block(triangles.subspan(half), centers, sizes);
 }
 
 // How many triangles each piece has.
@@ -101,7 +101,7 @@ Cloth::Cloth(const std::vector<SheetDefinition>& sheets) {
     std::iota(order.begin(), order.end(), 0);
     std::vector<std::size_t> sizes;
     for (std::size_t begin = 0; const std::size_t count : pieces_of(definition.shape)) {
-      divide(std::span(order).subspan(begin, count), centers, sizes);
+      divide_block(std::span(order).subspan(begin, count), centers, sizes);
       begin += count;
       for (const std::size_t size : sizes)
         first_block.push_back(first_block.back() + static_cast<int>(size));

@@ -2,33 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/cloth_contact/nearest.h"
 
 namespace weft {
 namespace {
 
-constexpr double kRounding = 1.001;  // of motion as solvers tell it
-constexpr double kSpare = 1.5;       // of reach, for steps to come
-constexpr int kPasses = 16;          // at most
-constexpr double kEnough = 1e-3;     // of thickness: what needs no other pass
-constexpr double kShare = 0.1;       // of its depth that a pair is moved apart in a step
-
-// All sheets' positions, m.
-void read_all(std::span<MovingSheet> sheets, const Cloth& cloth, Matrix3Xd& x) {
-  x.resize(3, cloth.particles());
-  Matrix3Xd own;
-  for (std::size_t s = 0; s < sheets.size(); ++s) {
-    sheets[s].solver->positions(own);
-    x.middleCols(cloth.first_particle[s], own.cols()) = own;
-  }
-}
+constexpr double kMotionRounding = 1.001;  // of motion as solvers tell it
+constexpr double kSpareReach = 1.5;        // of reach, for steps to come
+constexpr int kMostPasses = 16;            // at most
+constexpr double kNoMorePasses = 1e-3;     // of thickness: what needs no other pass
+constexpr double kDepthShare = 0.1;        // of its depth that a pair is moved apart in a step
 
 }  // namespace
 
 ClothContact::ClothContact(const Scene& scene)
     : scene_(scene), cloth_(scene.sheets), lists_(cloth_) {
   thickest_ = *std::max_element(cloth_.thickness.begin(), cloth_.thickness.end());
+  every_.resize(static_cast<std::size_t>(cloth_.particles()));
+  std::iota(every_.begin(), every_.end(), 0);
   place_.assign(static_cast<std::size_t>(cloth_.particles()), -1);
 }
 
@@ -36,49 +29,62 @@ void ClothContact::forget() {
   lists_.forget();
   candidates_ = {};
   contacts_ = {};
-  all_ = x_ = d_ = {};
+  begin_ = x_ = d_ = {};
   listed_ = pruned_ = {};
-  corrected_ = 0;
+  corrected_ = moved_before_ = 0;
 }
 
 void ClothContact::resolve(std::span<MovingSheet> sheets) {
   double moved = 0, pushed = 0;
   for (const MovingSheet& sheet : sheets) {
-    moved = std::max(moved, kRounding * sheet.solver->moved());
-    pushed = std::max(pushed, kRounding * sheet.solver->pushed());
+    moved = std::max(moved, kMotionRounding * sheet.solver->moved());
+    pushed = std::max(pushed, kMotionRounding * sheet.solver->pushed());
   }
   // pairs act from as far as they may come in this step; faster than their own thickness they may
   // pass unseen
   const double margin = std::min(2 * moved, thickest_);
-  const double relative = 2 * (moved + pushed + corrected_);
+  const double relative = 2 * (moved_before_ + pushed + corrected_);
   corrected_ = 0;
+  listed_.used += relative;
+  pruned_.used += relative;
   if (scene_.solver.plain) {
     if (candidates_.empty()) take(all_pairs(cloth_));
   } else {
-    listed_.used += relative;
-    pruned_.used += relative;
-    if (!listed_.lasts(margin)) list(sheets, margin, moved);
-    if (!pruned_.lasts(margin)) prune(sheets, margin, moved);
+    if (!listed_.lasts(margin)) list(sheets, margin);
+    if (!pruned_.lasts(margin)) prune(sheets, margin);
   }
-  if (candidates_.empty()) return;
-
-  read(sheets);
-  touch(margin);
-  if (contacts_.empty()) return;
-  separate();
-  write(sheets);
+  if (!candidates_.empty()) {
+    read(sheets);
+    touch(margin);
+    if (!contacts_.empty()) {
+      separate();
+      write(sheets);
+    }
+  }
+  moved_before_ = moved;
 }
 
-// Pairs look at the begin of a step, lists at its end.
-void ClothContact::list(std::span<MovingSheet> sheets, double margin, double moved) {
-  read_all(sheets, cloth_, all_);
-  lists_.update(all_, margin + 2 * moved);
-  listed_ = {lists_.lasts(), 2 * moved};
+void ClothContact::list(std::span<MovingSheet> sheets, double margin) {
+  read_begin(sheets);
+  lists_.update(begin_, margin);
+  listed_ = {lists_.lasts(), 0};
   pruned_ = {};
 }
 
+void ClothContact::read_begin(std::span<MovingSheet> sheets) {
+  begin_.resize(3, cloth_.particles());
+  Matrix3Xd& d = d_;
+  d.resize(3, cloth_.particles());
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const int first = cloth_.first_particle[s], count = cloth_.first_particle[s + 1] - first;
+    sheets[s].solver->read(std::span(every_).first(static_cast<std::size_t>(count)),
+                           begin_.middleCols(first, count), d.middleCols(first, count));
+  }
+  begin_ -= d;
+}
+
 // Of those listed the ones that may act soon.
-void ClothContact::prune(std::span<MovingSheet> sheets, double margin, double moved) {
+void ClothContact::prune(std::span<MovingSheet> sheets, double margin) {
   constexpr std::size_t kWorthPruning = 1000;
   std::vector<ClothPairs> near;
   std::size_t count = 0;
@@ -89,15 +95,15 @@ void ClothContact::prune(std::span<MovingSheet> sheets, double margin, double mo
     pruned_ = listed_;
     return take(near);
   }
-  read_all(sheets, cloth_, all_);
-  pruned_ = {std::max(thickest_ / 4, kSpare * (margin + 2 * moved)), 2 * moved};
+  read_begin(sheets);
+  pruned_ = {std::max(thickest_ / 4, kSpareReach * margin), 0};
   lists_.for_each_list([&](const ClothPairs& pairs) {
     ClothPairs& some_near = near.emplace_back();
     for (const ClothPair& pair : pairs.corners)
-      if (near_corner(cloth_, all_, pair.first, pair.second, pruned_.reach))
+      if (near_corner(cloth_, begin_, pair.first, pair.second, pruned_.reach))
         some_near.corners.push_back(pair);
     for (const ClothPair& pair : pairs.edges)
-      if (near_edges(cloth_, all_, pair.first, pair.second, pruned_.reach))
+      if (near_edges(cloth_, begin_, pair.first, pair.second, pruned_.reach))
         some_near.edges.push_back(pair);
   });
   take(near);
@@ -210,10 +216,10 @@ void ClothContact::touch(double margin) {
 }
 
 void ClothContact::separate() {
-  for (int pass = 0; pass < kPasses; ++pass) {
+  for (int pass = 0; pass < kMostPasses; ++pass) {
     double most = 0;
     for (const Contact& contact : contacts_) most = std::max(most, separate(contact));
-    if (most <= kEnough * thickest_) break;
+    if (most <= kNoMorePasses * thickest_) break;
   }
 }
 
@@ -238,7 +244,7 @@ double ClothContact::separate(const Contact& contact) {
   }
 
   const double depth = contact.thickness - contact.distance;
-  const double wanted = contact.thickness - (1 - kShare) * std::max(depth, 0.0);
+  const double wanted = contact.thickness - (1 - kDepthShare) * std::max(depth, 0.0);
   const double missing = wanted - contact.distance - normal.dot(way + change);
   if (push <= 0 && missing <= 0) return 0;
   const Eigen::Vector4d out = change + std::max(missing, 0.0) * normal;
@@ -258,7 +264,7 @@ void ClothContact::write(std::span<MovingSheet> sheets) {
       const Vector3d d = d_.col(static_cast<Eigen::Index>(k));
       const Vector3d by = movers_[k].way.head<3>() - d, in_step = movers_[k].in_step.head<3>() - d;
       if (by.isZero(0) && in_step.isZero(0)) continue;
-      corrected_ = std::max(corrected_, kRounding * by.norm());
+      corrected_ = std::max(corrected_, kMotionRounding * by.norm());
       moved_.push_back(own_number_[k]);
       x_.col(n) = by;
       d_.col(n++) = in_step;

@@ -53,8 +53,9 @@ class ClothContact {
     double thickness, friction;
   };
 
-  void list(std::span<MovingSheet> sheets, double margin, double moved);
-  void prune(std::span<MovingSheet> sheets, double margin, double moved);
+  void list(std::span<MovingSheet> sheets, double margin);
+  void read_begin(std::span<MovingSheet> sheets);
+  void prune(std::span<MovingSheet> sheets, double margin);
   void take(const std::vector<ClothPairs>& lists);
   template <class F>
   void for_each_run(const F& f) const;
@@ -72,9 +73,11 @@ class ClothContact {
   PairLists lists_;
   double thickest_;  // m
   Slack listed_, pruned_;
-  double corrected_ = 0;  // farthest that a particle was moved in the last step, m
+  // farthest that a particle came by the last step, and that it was moved then, m
+  double moved_before_ = 0, corrected_ = 0;
 
-  Matrix3Xd all_;  // positions when last looked at, (3 x particles) m
+  Matrix3Xd begin_;         // of the step when last looked at, (3 x particles) m
+  std::vector<int> every_;  // 0 ... particles - 1
   std::vector<Candidate> candidates_;
   std::vector<int> place_;       // of each particle among particles_, or -1
   std::vector<int> particles_;   // that candidates have, ascending

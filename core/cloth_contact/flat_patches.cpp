@@ -10,7 +10,7 @@
 namespace weft {
 namespace {
 
-double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+double wedge(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
 // By Andrew's monotone chain.
 std::vector<Vector2d> convex_hull(std::vector<Vector2d> points) {
@@ -23,7 +23,7 @@ std::vector<Vector2d> convex_hull(std::vector<Vector2d> points) {
     const std::size_t begin = hull.size();
     for (const Vector2d& point : points) {
       while (hull.size() >= begin + 2 &&
-             cross(hull.back() - hull[hull.size() - 2], point - hull.back()) <= 0)
+             wedge(hull.back() - hull[hull.size() - 2], point - hull.back()) <= 0)
         hull.pop_back();
       hull.push_back(point);
     }

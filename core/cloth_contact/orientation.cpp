@@ -7,7 +7,7 @@
 namespace weft {
 namespace {
 
-int sign(double value) { return (value > 0) - (value < 0); }
+int sign_of(double value) { return (value > 0) - (value < 0); }
 
 // A sum of doubles without rounding: terms that do not overlap, the smallest first (Shewchuk 1997).
 // Exact as long as nothing over- or underflows.
@@ -34,7 +34,7 @@ class ExactSum {
     add_product(product, c);
     add_product(std::fma(a, b, -product), c);
   }
-  int sign() const { return terms_.empty() ? 0 : weft::sign(terms_.back()); }
+  int sign() const { return terms_.empty() ? 0 : weft::sign_of(terms_.back()); }
 
  private:
   std::vector<double> terms_;
@@ -51,7 +51,7 @@ void add_determinant(const Vector3d& a, const Vector3d& b, const Vector3d& c, do
 }
 
 // The component of (a - p) x (b - p) along an axis.
-int side(const Vector3d& p, const Vector3d& a, const Vector3d& b, Eigen::Index axis) {
+int normal_sign(const Vector3d& p, const Vector3d& a, const Vector3d& b, Eigen::Index axis) {
   const Eigen::Index j = (axis + 1) % 3, k = (axis + 2) % 3;
   ExactSum sum;
   for (const auto& [u, v] : {std::pair(a, b), std::pair(b, p), std::pair(p, a)}) {
@@ -66,7 +66,7 @@ int side(const Vector3d& p, const Vector3d& a, const Vector3d& b, Eigen::Index a
 // that meet there agree.
 int passing_side(const Vector3d& p, const Vector3d& q, const Vector3d& a, const Vector3d& b) {
   int found = orientation(p, a, b, q);
-  for (Eigen::Index axis = 0; axis < 3 && found == 0; ++axis) found = side(p, a, b, axis);
+  for (Eigen::Index axis = 0; axis < 3 && found == 0; ++axis) found = normal_sign(p, a, b, axis);
   return found;
 }
 
@@ -80,7 +80,7 @@ int orientation(const Vector3d& a, const Vector3d& b, const Vector3d& c, const V
                           size.z() * other.x() + size.x() * other.z(),
                           size.x() * other.y() + size.y() * other.x());
   constexpr double kError = 1e-15;  // above (7 + 56 epsilon) epsilon, epsilon = 2^-53
-  if (std::abs(estimate) > kError * products.dot(w.cwiseAbs())) return -sign(estimate);
+  if (std::abs(estimate) > kError * products.dot(w.cwiseAbs())) return -sign_of(estimate);
 
   ExactSum sum;
   add_determinant(a, b, c, -1, sum);

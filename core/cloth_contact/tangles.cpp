@@ -12,30 +12,30 @@ namespace {
 
 constexpr std::size_t kMostTold = 3;
 
-std::string particles_of(const Scene& scene, std::size_t sheet, std::span<const int> particles) {
+std::string name_particles(const Scene& scene, std::size_t sheet, std::span<const int> particles) {
   std::string text = join(scene.sheets[sheet].name, " ");
   for (std::size_t k = 0; k < particles.size(); ++k) text += join(k == 0 ? "" : "-", particles[k]);
   return text;
 }
 
-std::string describe(const Scene& scene, const ClothCuts& cuts) {
+std::string describe_cuts(const Scene& scene, const ClothCuts& cuts) {
   std::string text = join(cuts.count, " edges pass through triangles");
   for (std::size_t k = 0; k < cuts.first.size(); ++k) {
     const ClothCut& cut = cuts.first[k];
-    text += join(k == 0 ? ": " : ", ", particles_of(scene, cut.edge_sheet, cut.edge), " through ",
-                 particles_of(scene, cut.triangle_sheet, cut.triangle));
+    text += join(k == 0 ? ": " : ", ", name_particles(scene, cut.edge_sheet, cut.edge), " through ",
+                 name_particles(scene, cut.triangle_sheet, cut.triangle));
   }
   return text;
 }
 
-std::string describe(const Scene& scene, const Cloth& cloth, const ClothPairs& near) {
+std::string describe_near(const Scene& scene, const Cloth& cloth, const ClothPairs& near) {
   std::string text =
       join(near.corners.size() + near.edges.size(), " pairs are nearer than their thickness");
   for (std::size_t k = 0; k < std::min(kMostTold, near.corners.size()); ++k) {
     const int i = near.corners[k].first;
     const int own = cloth.own_number(i);
     text += join(k == 0 ? ": at " : ", ",
-                 particles_of(scene, static_cast<std::size_t>(cloth.sheet_of(i)), {&own, 1}));
+                 name_particles(scene, static_cast<std::size_t>(cloth.sheet_of(i)), {&own, 1}));
   }
   return text;
 }
@@ -61,8 +61,8 @@ std::optional<Warning> find_tangles(const Scene& scene, const std::vector<Matrix
   const ClothCuts cuts = count_cuts(scene.sheets, x, kMostTold);
   if (near.empty() && cuts.count == 0) return std::nullopt;
   std::string text;
-  if (cuts.count > 0) text += describe(scene, cuts) + ". What has passed through stays so. ";
-  if (!near.empty()) text += describe(scene, cloth, near) + ". They are pushed apart";
+  if (cuts.count > 0) text += describe_cuts(scene, cuts) + ". What has passed through stays so. ";
+  if (!near.empty()) text += describe_near(scene, cloth, near) + ". They are pushed apart";
   return Warning{"TANGLED_START", "sheets", text};
 }
 

@@ -138,6 +138,12 @@ void describe_forces(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan)
     plan.skipped.push_back({join(sheet.name, ": drag"), "the textile has no air drag"});
 }
 
+void describe_cloth_contact(const Scene& scene, Plan& plan) {
+  for (const SheetDefinition& sheet : scene.sheets)
+    plan.passes.push_back(join(sheet.name, ": cloth contact at ", sheet.thickness_or_default(),
+                               " m, ", triangle_count(sheet.shape), " triangles"));
+}
+
 // B and c_b along warp and weft, N m and N/m, and the weight of an area, Pa.
 struct Stiffness {
   double weight;
@@ -292,8 +298,9 @@ void warn_of_damping(const Scene& scene, const std::vector<PlannedSheet>& planne
 
 void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
           const std::vector<StableStep>& steps, Plan& plan) {
-  plan.warnings.push_back({"NO_SELF_COLLISION", "", "a sheet may pass through itself"});
-  if (scene.sheets.size() > 1)
+  if (!scene.cloth_contact)
+    plan.warnings.push_back({"NO_SELF_COLLISION", "", "a sheet may pass through itself"});
+  if (!scene.cloth_contact && scene.sheets.size() > 1)
     plan.warnings.push_back(
         {"NO_SHEET_SHEET_COLLISION", "sheets", "sheets may pass through each other"});
   for (std::size_t c = 0; c < scene.colliders.size(); ++c)
@@ -349,6 +356,7 @@ Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
   };
   pass("wind", scene.environment.wind.has_value(), "the scene has none");
   pass("contact", !scene.colliders.empty(), "the scene has no collider");
+  if (scene.cloth_contact) describe_cloth_contact(scene, plan);
   warn(scene, sheets, steps, plan);
   return plan;
 }

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <limits>
 
+#include "core/cloth_contact/tangles.h"
 #include "core/contact/contact.h"
 #include "core/forces/air.h"
 #include "core/forces/elastic.h"
@@ -66,12 +67,15 @@ void Simulation::State::step(double time, double dt, ThreadPool& pool) {
     // forces and motion
     sheet.solver->advance(time, pool);
     move_pins(definition.pins, time + dt, dt, sheet);
-
-    // contact last, so that no particle ends a step inside a collider
-    if (!scene.colliders.empty())
-      sheet.solver->resolve(
-          Contacts(scene.colliders, definition.textile.friction, sheet.skin, time + dt, dt), pool);
   }
+  if (cloth_contact) cloth_contact->resolve(sheets);
+
+  // colliders last, so that no particle ends a step inside one
+  if (scene.colliders.empty()) return;
+  for (std::size_t s = 0; s < sheets.size(); ++s)
+    sheets[s].solver->resolve(
+        Contacts(scene.colliders, scene.sheets[s].textile.friction, sheets[s].skin, time + dt, dt),
+        pool);
 }
 
 // False: the frame cannot be computed.
@@ -114,6 +118,7 @@ Decision Simulation::State::repair(const Attempt& made, NextStates& next) {
     unfinished->substeps = 0;
     for (MovingSheet& sheet : sheets)
       sheet.solver->start(sheet.good().x, sheet.good().v, time(), plan.step.substep);
+    forget_motion();
   } else if (decision == Decision::kConfirmed) {
     for (std::size_t s = 0; s < sheets.size(); ++s)
       sheets[s].most_strain = std::max(sheets[s].most_strain, 2 * made.sheets[s].strain);
@@ -133,6 +138,14 @@ void Simulation::State::restart_from(NextStates& next) {
     sheets[s].solver->start(next[s].x, v, end, plan.step.substep);
     sheets[s].read(next[s]);
   }
+  forget_motion();
+}
+
+// To be called where solvers start or load.
+void Simulation::State::forget_motion() {
+  if (!cloth_contact) return;
+  cloth_contact->forget();
+  for (MovingSheet& sheet : sheets) sheet.solver->measure();
 }
 
 // Halves the step from the frame's end on where energy came from nothing; false: no shorter step
@@ -220,6 +233,11 @@ Simulation::State::State(Scene given, SolverFactory factory)
     sheets[s].solver->start(x[s], v, 0, dt);
     sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
   }
+  if (scene.cloth_contact) {
+    cloth_contact.emplace(scene);
+    if (auto tangled = find_tangles(scene, x)) plan.warnings.push_back(std::move(*tangled));
+  }
+  forget_motion();
 }
 
 int Simulation::State::particle_count() const {
@@ -232,6 +250,7 @@ void Simulation::State::release_memory() {
   // solvers are beyond the last good frame
   if (!failure.empty() || unfinished) return;
   for (MovingSheet& sheet : sheets) sheet.release_memory();
+  cloth_contact.reset();
   released = true;
 }
 
@@ -239,6 +258,7 @@ void Simulation::State::release_memory() {
 void Simulation::State::restore_memory() {
   if (!released) return;
   for (std::size_t s = 0; s < sheets.size(); ++s) sheets[s].restore_memory(scene, capped(s));
+  if (scene.cloth_contact) cloth_contact.emplace(scene);
   released = false;
 }
 

@@ -41,6 +41,7 @@ void Simulation::State::restart(const SheetStates& states, double old_dt,
     sheets[s].solver->start(states.x[s], states.v[s], time(), dt);
     sheets[s].read_good();
   }
+  forget_motion();
 }
 
 void Simulation::State::put_textile(std::size_t sheet, const Textile& textile) {

@@ -71,6 +71,7 @@ bool Simulation::State::adopt(const Snapshot& snapshot) {
     sheet.solver->start(saved.x, saved.v, time(), plan.step.substep);
     if (!sheet.solver->load(saved.solver)) return false;
   }
+  forget_motion();
   return true;
 }
 

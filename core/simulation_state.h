@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/cloth_contact/cloth_contact.h"
 #include "core/model/actions.h"
 #include "core/motion/rest.h"
 #include "core/moving_sheet.h"
@@ -34,6 +35,7 @@ struct Simulation::State {
   SolverFactory make_solver;
   Plan plan;
   std::vector<MovingSheet> sheets;
+  std::optional<ClothContact> cloth_contact;
   std::vector<Grip> grips;  // their pins are among the scene's
   std::int64_t frame = 0;
   std::int64_t substeps = 0;  // of the last frame
@@ -65,6 +67,7 @@ struct Simulation::State {
   Attempt inspect_sheets(NextStates& next);
   Decision repair(const Attempt& made, NextStates& next);
   void restart_from(NextStates& next);
+  void forget_motion();
   bool keep_to_budget(NextStates& next);
   bool fail(const char* what, const std::string& reason);
   bool quiet(const NextStates& next) const;

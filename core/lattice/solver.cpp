@@ -1,6 +1,7 @@
 #include "core/lattice/solver.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -49,7 +50,7 @@ class LatticeSolver : public SheetSolver {
       at[State::kStep2] = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
     });
     std::fill(gap_.begin(), gap_.end(), 0);
-    least_gap_ = come_ = 0;
+    least_gap_ = come_ = pushed_ = 0;
   }
 
   void advance(double time, ThreadPool& pool) override {
@@ -73,11 +74,13 @@ class LatticeSolver : public SheetSolver {
     for (int axis = 0; axis < 3; ++axis)
       at[State::kW + axis] = static_cast<T>(3 * d[axis]) - at[State::kD + axis];
     set_displacement(at, d);
+    moved_ = std::max(moved_, d.norm());
   }
 
   // A row is looked at again when it, or a collider, may have come as far as its gap was wide.
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
+    pushed_ = 0;
     constexpr double kRounding = 1.001;
     come_ += kRounding * (moved_ + contacts.reach());
     if (come_ < least_gap_) return;
@@ -89,12 +92,19 @@ class LatticeSolver : public SheetSolver {
     const bool in_parts = contacts.may_cross(moved_);
     const int count = static_cast<int>(near_.size());
     const int parts = std::clamp(count, 1, bands(pool));
+    std::vector<double> pushed(static_cast<std::size_t>(parts));
     const auto resolve_part = [&](int part) {
+      std::vector<Vector3d> before;
       for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
         const int r = near_[static_cast<std::size_t>(i)];
+        if (measures_) copy_row(r, before);
         gap_[static_cast<std::size_t>(r)] =
             in_parts ? resolve_in_parts(contacts, r)
                      : resolve_row(contacts, origin_, law_.compensated, r, state_);
+        if (measures_) {
+          double& most = pushed[static_cast<std::size_t>(part)];
+          most = std::max(most, farthest_from(before, r));
+        }
       }
     };
     if (parts == 1)
@@ -102,6 +112,31 @@ class LatticeSolver : public SheetSolver {
     else
       pool.run(parts, resolve_part);
     least_gap_ = *std::min_element(gap_.begin(), gap_.end());
+    pushed_ = *std::max_element(pushed.begin(), pushed.end());
+  }
+
+  void measure() override { law_.measured = measures_ = true; }
+  double moved() const override { return moved_; }
+  double pushed() const override { return pushed_; }
+  void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
+            Eigen::Ref<Matrix3Xd> d) const override {
+    for (Eigen::Index k = 0; const int i : particles) {
+      const ConstPlace at = state_.place(i / columns_, i % columns_);
+      x.col(k) = position(at);
+      d.col(k++) = displacement(at);
+    }
+  }
+  void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
+                const Eigen::Ref<const Matrix3Xd>& in_step) override {
+    moved_ += std::sqrt(by.colwise().squaredNorm().maxCoeff());
+    for (Eigen::Index k = 0; const int i : particles) {
+      const Place at = state_.place(i / columns_, i % columns_);
+      set_position(at, position(at) + by.col(k));
+      set_displacement(at, displacement(at) + in_step.col(k));
+      for (int axis = 0; axis < 3; ++axis)
+        at[State::kW + axis] += static_cast<T>(3 * in_step(axis, k));
+      ++k;
+    }
   }
 
   // Smaller bands cost more to share than they take.
@@ -114,10 +149,7 @@ class LatticeSolver : public SheetSolver {
 
   void positions(Matrix3Xd& x) const override {
     x.resize(3, particles_);
-    for_each_particle([&](int i, ConstPlace at) {
-      for (int axis = 0; axis < 3; ++axis)
-        x(axis, i) = origin_[axis] + exact(State::kX + axis, State::kXError + axis, at);
-    });
+    for_each_particle([&](int i, ConstPlace at) { x.col(i) = position(at); });
   }
   void velocities(Matrix3Xd& v) const override {
     v.resize(3, particles_);
@@ -194,6 +226,20 @@ class LatticeSolver : public SheetSolver {
   double exact(int plane, int error, P at) const {
     return law_.compensated ? at[plane] - double{at[error]} : at[plane];
   }
+  template <class P>
+  Vector3d position(P at) const {
+    Vector3d x;
+    for (int axis = 0; axis < 3; ++axis)
+      x[axis] = origin_[axis] + exact(State::kX + axis, State::kXError + axis, at);
+    return x;
+  }
+  template <class P>
+  Vector3d displacement(P at) const {
+    Vector3d d;
+    for (int axis = 0; axis < 3; ++axis)
+      d[axis] = exact(State::kD + axis, State::kDError + axis, at);
+    return d;
+  }
   void set(int plane, int error, Place at, const Vector3d& exact) {
     for (int axis = 0; axis < 3; ++axis) {
       const T rounded = at[plane + axis] = static_cast<T>(exact[axis]);
@@ -211,11 +257,7 @@ class LatticeSolver : public SheetSolver {
     for (int c = 0; c < columns_; ++c) {
       const Place at = state_.place(row, c);
       if (at[State::kStep2] == 0) continue;
-      Vector3d x, d;
-      for (int axis = 0; axis < 3; ++axis) {
-        x[axis] = origin_[axis] + exact(State::kX + axis, State::kXError + axis, at);
-        d[axis] = exact(State::kD + axis, State::kDError + axis, at);
-      }
+      Vector3d x = position(at), d = displacement(at);
       const Vector3d before = d;
       if (contacts.resolve(x, d)) {
         set_position(at, x);
@@ -226,6 +268,19 @@ class LatticeSolver : public SheetSolver {
       nearest = std::min(nearest, contacts.gap(x));
     }
     return nearest;
+  }
+
+  void copy_row(int row, std::vector<Vector3d>& x) {
+    x.clear();
+    for (int c = 0; c < columns_; ++c) x.push_back(position(state_.place(row, c)));
+  }
+  double farthest_from(const std::vector<Vector3d>& before, int row) {
+    double squared = 0;
+    for (int c = 0; c < columns_; ++c)
+      squared = std::max(
+          squared,
+          (position(state_.place(row, c)) - before[static_cast<std::size_t>(c)]).squaredNorm());
+    return std::sqrt(squared);
   }
 
   // Drag over mass is one for all particles: both go by area, 1/s.
@@ -243,6 +298,8 @@ class LatticeSolver : public SheetSolver {
   bool started_ = false;
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
   double moved_ = 0;                    // farthest displacement of the last step, m
+  double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
+  bool measures_ = false;               // pushed_
   std::vector<double> gap_;             // of each row to the nearest skin, at least, m
   double least_gap_ = 0;                // of all rows
   double come_ = 0;                     // how far sheet and colliders may have come since, m

@@ -197,6 +197,9 @@ void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& 
   if (sheet.skin) check.number(field + ".skin_m", *sheet.skin, 0, 1, "m");
   if (!sized) return;
 
+  constexpr double kThinnest = 1e-6;
+  if (sheet.thickness)
+    check.number(field + ".thickness_m", *sheet.thickness, kThinnest, most_thickness(sheet), "m");
   check_values(field + ".start_positions_m", sheet.start_positions, sheet.particle_count(), 1e4,
                "m", check);
   check_values(field + ".start_velocities_m_per_s", sheet.start_velocities, sheet.particle_count(),

@@ -30,4 +30,18 @@ BendingLaw default_bending(Accuracy accuracy) {
   return ChoiKo{.evaluator = Evaluator::kPolynomial, .degree = 12};
 }
 
+double most_thickness(const SheetDefinition& sheet) { return shortest_edge(sheet.shape) / 4; }
+
+double SheetDefinition::thickness_or_default() const {
+  constexpr double kUsual = 2e-3;
+  return thickness.value_or(std::min(kUsual, most_thickness(*this)));
+}
+
+bool wants_cloth_contact(const Scene& scene) {
+  return scene.sheets.size() > 1 ||
+         std::any_of(scene.sheets.begin(), scene.sheets.end(), [](const SheetDefinition& sheet) {
+           return std::holds_alternative<Triangles>(sheet.shape);
+         });
+}
+
 }  // namespace weft

@@ -71,10 +71,14 @@ struct SheetDefinition {
   std::vector<double> start_velocities;            // (3 x particles), m/s; or empty
   std::vector<Pin> pins;
   std::optional<double> skin;  // m; absent: spacing / 10
+  // At which it keeps cloth away, its own and other sheets', m; absent: 2 mm, or as much as the
+  // mesh allows.
+  std::optional<double> thickness;
 
   int particle_count() const { return weft::particle_count(shape); }
   double spacing() const { return weft::spacing(shape); }                   // m
   double skin_or_default() const { return skin.value_or(spacing() / 10); }  // m
+  double thickness_or_default() const;                                      // m
 };
 
 struct Plane {
@@ -150,12 +154,19 @@ enum class Accuracy {
 SolverSettings default_settings(Accuracy accuracy);
 BendingLaw default_bending(Accuracy accuracy);
 
+// The thickest that a sheet may be: a quarter of its shortest edge, m.
+double most_thickness(const SheetDefinition& sheet);
+
 struct Scene {
   std::vector<SheetDefinition> sheets;
+  bool cloth_contact = false;  // whether sheets keep themselves and each other from passing through
   std::vector<Collider> colliders;
   Environment environment;
   SolverSettings solver;
 };
+
+// Whether cloth contact is worth having where nobody says: for triangles, and for several sheets.
+bool wants_cloth_contact(const Scene& scene);
 
 struct Problem {
   std::string field;    // path in a scene file, "sheets[0].grid.rows"

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace weft {
 namespace {
 
 int particle_count_of(const Grid& grid) { return grid.rows * grid.columns; }
 double spacing_of(const Grid& grid) { return grid.spacing; }
+double shortest_edge_of(const Grid& grid) { return grid.spacing; }
 Extent extent_of(const Grid& grid) {
   return {static_cast<double>(grid.columns - 1), static_cast<double>(grid.rows - 1)};
 }
@@ -31,6 +33,14 @@ std::vector<std::array<int, 3>> triangles_in(const Grid& grid) {
 
 int particle_count_of(const Triangles& mesh) { return static_cast<int>(mesh->start.size()); }
 double spacing_of(const Triangles& mesh) { return mesh->spacing; }
+double shortest_edge_of(const Triangles& mesh) {
+  double shortest = std::numeric_limits<double>::infinity();
+  for (std::size_t t = 0; t < mesh->triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k)
+      shortest = std::min(shortest,
+                          (flat_corner(*mesh, t, (k + 1) % 3) - flat_corner(*mesh, t, k)).norm());
+  return shortest;
+}
 Extent extent_of(const Triangles& mesh) {
   return {mesh->size.x() / mesh->spacing, mesh->size.y() / mesh->spacing};
 }
@@ -119,6 +129,10 @@ int triangle_count(const SheetShape& shape) {
 
 double spacing(const SheetShape& shape) {
   return std::visit([](const auto& each) { return spacing_of(each); }, shape);
+}
+
+double shortest_edge(const SheetShape& shape) {
+  return std::visit([](const auto& each) { return shortest_edge_of(each); }, shape);
 }
 
 Extent extent(const SheetShape& shape) {

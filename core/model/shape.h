@@ -64,6 +64,8 @@ int triangle_count(const SheetShape& shape);
 
 // Between neighbours: the length by which a sheet's own lengths are judged, m.
 double spacing(const SheetShape& shape);
+// Of its triangles, in the flat shape, m.
+double shortest_edge(const SheetShape& shape);
 
 // Along warp and weft, in spacings.
 struct Extent {

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <cmath>
+
 #include "core/motion/saved_values.h"
 #include "core/motion/sheet_solver.h"
 
@@ -11,6 +14,7 @@ class PlainSolver : public SheetSolver {
 
   void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
     dt_ = dt;
+    pushed_ = 0;
     motion_.x = x;
     integrator_->start(dynamics_, time, dt, v, motion_);
   }
@@ -25,12 +29,32 @@ class PlainSolver : public SheetSolver {
   }
 
   void resolve(const Contacts& contacts, ThreadPool& /*pool*/) override {
+    pushed_ = 0;
     for (Eigen::Index i = 0; i < motion_.x.cols(); ++i) {
       if (dynamics_.inverse_mass[i] == 0) continue;
       Vector3d x = motion_.x.col(i), d = motion_.d.col(i);
       if (!contacts.resolve(x, d)) continue;
+      pushed_ = std::max(pushed_, (x - motion_.x.col(i)).norm());
       motion_.x.col(i) = x;
       motion_.d.col(i) = d;
+    }
+  }
+
+  void measure() override {}
+  double moved() const override { return std::sqrt(motion_.d.colwise().squaredNorm().maxCoeff()); }
+  double pushed() const override { return pushed_; }
+  void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
+            Eigen::Ref<Matrix3Xd> d) const override {
+    for (Eigen::Index k = 0; const int i : particles) {
+      x.col(k) = motion_.x.col(i);
+      d.col(k++) = motion_.d.col(i);
+    }
+  }
+  void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
+                const Eigen::Ref<const Matrix3Xd>& in_step) override {
+    for (Eigen::Index k = 0; const int i : particles) {
+      motion_.x.col(i) += by.col(k);
+      motion_.d.col(i) += in_step.col(k++);
     }
   }
 
@@ -58,6 +82,7 @@ class PlainSolver : public SheetSolver {
   std::unique_ptr<Integrator> integrator_;
   Motion motion_;
   double dt_ = 0;
+  double pushed_ = 0;  // m
 };
 
 }  // namespace

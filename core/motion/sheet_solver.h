@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 
 #include "core/contact/contact.h"
@@ -24,6 +25,19 @@ class SheetSolver {
   virtual void move_held(int particle, const Vector3d& x, const Vector3d& d) = 0;
   // Moves free particles out of colliders.
   virtual void resolve(const Contacts& contacts, ThreadPool& pool) = 0;
+
+  // From the next step on says how far particles come.
+  virtual void measure() = 0;
+  // The largest displacement of the last step, and the farthest that resolve() has moved a particle
+  // since, at most, m.
+  virtual double moved() const = 0;
+  virtual double pushed() const = 0;
+  // Of some particles: positions and displacements of the last step, m. (3 x particles)
+  virtual void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
+                    Eigen::Ref<Matrix3Xd> d) const = 0;
+  // Moves some free particles: adds to positions and to displacements of the step, m.
+  virtual void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
+                        const Eigen::Ref<const Matrix3Xd>& in_step) = 0;
 
   // More than these have nothing to do in a pool.
   virtual int most_threads() const { return 1; }

@@ -1,6 +1,7 @@
 #include "core/triangles/solver.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -47,7 +48,7 @@ class TriangleSolver : public SheetSolver {
       put(state_.w, i, v.col(i) * (2 * dt));
     }
     std::fill(gap_.begin(), gap_.end(), 0);
-    least_gap_ = come_ = 0;
+    least_gap_ = come_ = pushed_ = 0;
   }
 
   void advance(double time, ThreadPool& pool) override {
@@ -70,11 +71,13 @@ class TriangleSolver : public SheetSolver {
       state_.w.data()[at + axis] =
           static_cast<T>(3 * d[static_cast<Eigen::Index>(axis)]) - state_.d.data()[at + axis];
     set(state_.d, state_.d_error, particle, d);
+    moved_ = std::max(moved_, d.norm());
   }
 
   // A block is looked at again when it, or a collider, may have come as far as its gap was wide.
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
+    pushed_ = 0;
     constexpr double kRounding = 1.001;
     come_ += kRounding * (moved_ + contacts.reach());
     if (come_ < least_gap_) return;
@@ -86,12 +89,19 @@ class TriangleSolver : public SheetSolver {
     const bool in_parts = contacts.may_cross(moved_);
     const int count = static_cast<int>(near_.size());
     const int parts = std::clamp(count, 1, bands(pool));
+    std::vector<double> pushed(static_cast<std::size_t>(parts));
     const auto resolve_part = [&](int part) {
+      std::vector<Vector3d> before;
       for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
         const int b = near_[static_cast<std::size_t>(i)];
+        if (measures_) copy_block(b, before);
         gap_[static_cast<std::size_t>(b)] =
             in_parts ? resolve_in_parts(contacts, b)
                      : resolve_block(contacts, origin_, law_.compensated, b, state_);
+        if (measures_) {
+          double& most = pushed[static_cast<std::size_t>(part)];
+          most = std::max(most, farthest_from(before, b));
+        }
       }
     };
     if (parts == 1)
@@ -99,6 +109,31 @@ class TriangleSolver : public SheetSolver {
     else
       pool.run(parts, resolve_part);
     least_gap_ = *std::min_element(gap_.begin(), gap_.end());
+    pushed_ = *std::max_element(pushed.begin(), pushed.end());
+  }
+
+  void measure() override { law_.measured = measures_ = true; }
+  double moved() const override { return moved_; }
+  double pushed() const override { return pushed_; }
+  void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
+            Eigen::Ref<Matrix3Xd> d) const override {
+    for (Eigen::Index k = 0; const int i : particles) {
+      x.col(k) = position_at(place(i));
+      d.col(k++) = exact(state_.d, state_.d_error, place(i));
+    }
+  }
+  void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
+                const Eigen::Ref<const Matrix3Xd>& in_step) override {
+    moved_ += std::sqrt(by.colwise().squaredNorm().maxCoeff());
+    for (Eigen::Index k = 0; const int i : particles) {
+      const std::size_t at = place(i);
+      set_at(state_.x, state_.x_error, at, position_at(at) + by.col(k) - origin_);
+      set_at(state_.d, state_.d_error, at, exact(state_.d, state_.d_error, at) + in_step.col(k));
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        state_.w.data()[at + axis] +=
+            static_cast<T>(3 * in_step(static_cast<Eigen::Index>(axis), k));
+      ++k;
+    }
   }
 
   // Smaller shares cost more to share than they take.
@@ -120,8 +155,7 @@ class TriangleSolver : public SheetSolver {
 
   void positions(Matrix3Xd& x) const override {
     x.resize(3, particles_);
-    for (int i = 0; i < particles_; ++i)
-      x.col(i) = origin_ + exact(state_.x, state_.x_error, place(i));
+    for (int i = 0; i < particles_; ++i) x.col(i) = position_at(place(i));
   }
   void velocities(Matrix3Xd& v) const override {
     v.resize(3, particles_);
@@ -202,6 +236,9 @@ class TriangleSolver : public SheetSolver {
     }
     return v;
   }
+  Vector3d position_at(std::size_t at) const {
+    return origin_ + exact(state_.x, state_.x_error, at);
+  }
   void set(AlignedArray<T>& plane, AlignedArray<T>& error, int particle, const Vector3d& exact) {
     set_at(plane, error, place(particle), exact);
   }
@@ -226,7 +263,7 @@ class TriangleSolver : public SheetSolver {
     const std::size_t begin = static_cast<std::size_t>(block) * kValues;
     for (std::size_t at = begin; at < begin + kValues; at += 4) {
       if (state_.step2.data()[at] == 0) continue;
-      Vector3d x = origin_ + exact(state_.x, state_.x_error, at);
+      Vector3d x = position_at(at);
       Vector3d d = exact(state_.d, state_.d_error, at);
       const Vector3d before = d;
       if (contacts.resolve(x, d)) {
@@ -242,6 +279,21 @@ class TriangleSolver : public SheetSolver {
     return nearest;
   }
 
+  // Positions of a block's particles.
+  void copy_block(int block, std::vector<Vector3d>& x) const {
+    x.clear();
+    const std::size_t begin = static_cast<std::size_t>(block) * 4 * TriangleLaw<T>::kBlock;
+    for (std::size_t k = 0; k < TriangleLaw<T>::kBlock; ++k)
+      x.push_back(position_at(begin + 4 * k));
+  }
+  double farthest_from(const std::vector<Vector3d>& before, int block) const {
+    const std::size_t begin = static_cast<std::size_t>(block) * 4 * TriangleLaw<T>::kBlock;
+    double squared = 0;
+    for (std::size_t k = 0; k < TriangleLaw<T>::kBlock; ++k)
+      squared = std::max(squared, (position_at(begin + 4 * k) - before[k]).squaredNorm());
+    return std::sqrt(squared);
+  }
+
   const Mesh& mesh_;
   const Dynamics& dynamics_;
   int particles_;
@@ -253,6 +305,8 @@ class TriangleSolver : public SheetSolver {
   double moved_ = 0;                    // farthest displacement of the last step, at most, m
   std::vector<double> gap_;             // of each block to the nearest skin, at least, m
   double least_gap_ = 0;                // of all blocks
+  double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
+  bool measures_ = false;               // pushed_
   double come_ = 0;                     // how far sheet and colliders may have come since, m
   std::vector<int> near_;               // blocks that may touch, in this step
 };

@@ -34,6 +34,17 @@ class FaultySolver : public SheetSolver {
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     solver_->resolve(contacts, pool);
   }
+  void measure() override { solver_->measure(); }
+  double moved() const override { return solver_->moved(); }
+  double pushed() const override { return solver_->pushed(); }
+  void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
+            Eigen::Ref<Matrix3Xd> d) const override {
+    solver_->read(particles, x, d);
+  }
+  void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
+                const Eigen::Ref<const Matrix3Xd>& in_step) override {
+    solver_->displace(particles, by, in_step);
+  }
   void positions(Matrix3Xd& x) const override { solver_->positions(x); }
   void velocities(Matrix3Xd& v) const override { solver_->velocities(v); }
   void closing_velocities(double time, Matrix3Xd& v) const override {

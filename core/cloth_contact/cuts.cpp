@@ -1,0 +1,50 @@
+#include "core/cloth_contact/cuts.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "core/cloth_contact/near_blocks.h"
+#include "core/cloth_contact/orientation.h"
+
+namespace weft {
+
+ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vector<Matrix3Xd>& x,
+                     std::size_t most_told) {
+  const Cloth cloth(sheets);
+  Matrix3Xd all(3, cloth.particles());
+  for (std::size_t s = 0; s < sheets.size(); ++s)
+    all.middleCols(cloth.first_particle[s], x[s].cols()) = x[s];
+
+  std::vector<ClothCut> found;
+  const auto look = [&](int edges_of, int triangle) {
+    const auto& [a, b, c] = cloth.triangles[static_cast<std::size_t>(triangle)];
+    const auto from = static_cast<std::size_t>(edges_of);
+    for (int e = cloth.first_edge[from]; e < cloth.first_edge[from + 1]; ++e) {
+      const auto& [p, q] = cloth.edges[static_cast<std::size_t>(e)];
+      if (p == a || p == b || p == c || q == a || q == b || q == c) continue;
+      if (!cuts(all.col(p), all.col(q), all.col(a), all.col(b), all.col(c))) continue;
+      found.push_back({static_cast<std::size_t>(cloth.sheet_of(p)),
+                       static_cast<std::size_t>(cloth.sheet_of(a)),
+                       {cloth.own_number(p), cloth.own_number(q)},
+                       {cloth.own_number(a), cloth.own_number(b), cloth.own_number(c)}});
+    }
+  };
+  NearBlocks near(cloth);
+  near.set(all);
+  for (const BlockPair& blocks : near.meet(0)) {
+    if (near.distance(blocks) > 0) continue;
+    near.for_each_near(blocks, 0, [&](int one, int other) {
+      look(one, other);
+      look(other, one);
+    });
+  }
+
+  const auto told = found.begin() + static_cast<std::ptrdiff_t>(std::min(most_told, found.size()));
+  std::partial_sort(found.begin(), told, found.end(), [](const ClothCut& s, const ClothCut& t) {
+    return std::tie(s.edge_sheet, s.edge, s.triangle_sheet, s.triangle) <
+           std::tie(t.edge_sheet, t.edge, t.triangle_sheet, t.triangle);
+  });
+  return {static_cast<std::int64_t>(found.size()), {found.begin(), told}};
+}
+
+}  // namespace weft

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/model/mesh.h"
+
+namespace weft {
+
+// An edge of cloth that passes through a triangle of cloth, by sheets and their particles.
+struct ClothCut {
+  std::size_t edge_sheet = 0, triangle_sheet = 0;
+  std::array<int, 2> edge{};
+  std::array<int, 3> triangle{};
+};
+
+// Where sheets pass through themselves and each other.
+struct ClothCuts {
+  std::int64_t count = 0;
+  std::vector<ClothCut>
+      first;  // in the order of sheets and particles, at most so many as asked for
+};
+
+// Counts them exactly (orientation.h), without edges that share a particle with the triangle.
+// x: positions of each sheet, (3 x particles) m.
+ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vector<Matrix3Xd>& x,
+                     std::size_t most_told = 10);
+
+}  // namespace weft

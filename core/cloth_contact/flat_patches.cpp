@@ -1,0 +1,188 @@
+#include "core/cloth_contact/flat_patches.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+#include <utility>
+
+namespace weft {
+namespace {
+
+double wedge(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// By Andrew's monotone chain.
+std::vector<Vector2d> convex_hull(std::vector<Vector2d> points) {
+  const auto before = [](const Vector2d& a, const Vector2d& b) {
+    return a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
+  };
+  std::sort(points.begin(), points.end(), before);
+  std::vector<Vector2d> hull;
+  for (int turn = 0; turn < 2; ++turn) {
+    const std::size_t begin = hull.size();
+    for (const Vector2d& point : points) {
+      while (hull.size() >= begin + 2 &&
+             wedge(hull.back() - hull[hull.size() - 2], point - hull.back()) <= 0)
+        hull.pop_back();
+      hull.push_back(point);
+    }
+    hull.pop_back();  // the other turn begins there
+    std::reverse(points.begin(), points.end());
+  }
+  return hull;
+}
+
+// Calls f(corner, inward normal of length 1) for the sides of a polygon until it returns false;
+// whether it never did.
+template <class F>
+bool all_sides(const std::vector<Vector2d>& polygon, const F& f) {
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Vector2d side = polygon[(k + 1) % polygon.size()] - polygon[k];
+    if (!f(polygon[k], Vector2d(Vector2d(-side.y(), side.x()).normalized()))) return false;
+  }
+  return true;
+}
+
+// Whether a part of the way from `from` to `to` lies deeper inside than `depth`, m.
+bool passes_inside(const std::vector<Vector2d>& polygon, const Vector2d& from, const Vector2d& to,
+                   double depth) {
+  double begin = 0, end = 1;
+  return all_sides(polygon, [&](const Vector2d& corner, const Vector2d& normal) {
+    const double at = normal.dot(from - corner) - depth, rise = normal.dot(to - from);
+    if (rise > 0)
+      begin = std::max(begin, -at / rise);
+    else if (rise < 0)
+      end = std::min(end, at / -rise);
+    else if (at <= 0)
+      return false;
+    return begin < end;
+  });
+}
+
+// Whether no side of `one` has all of the other beyond it.
+bool may_meet(const std::vector<Vector2d>& one, const std::vector<Vector2d>& other) {
+  return all_sides(one, [&](const Vector2d& corner, const Vector2d& normal) {
+    return std::any_of(other.begin(), other.end(),
+                       [&](const Vector2d& point) { return normal.dot(point - corner) >= 0; });
+  });
+}
+
+}  // namespace
+
+FlatPatches::FlatPatches(const Cloth& cloth) : cloth_(cloth) {
+  const std::size_t blocks = cloth.first_block.size() - 1;
+  std::vector<Vector2d> corners;
+  // by piece, particles and place: how often
+  std::map<std::tuple<int, int, int, double, double>, std::pair<int, Border>> sides;
+  for (std::size_t b = 0; b < blocks; ++b) {
+    corners.clear();
+    double least = std::numeric_limits<double>::infinity();
+    for (int t = cloth.first_block[b]; t < cloth.first_block[b + 1]; ++t) {
+      const auto at = static_cast<std::size_t>(t);
+      const auto& flat = cloth.flat[at];
+      Eigen::Matrix2d edges;
+      edges << flat[1] - flat[0], flat[2] - flat[0];
+      inverse_.push_back(edges.inverse());
+      const double longest =
+          std::max({edges.col(0).norm(), edges.col(1).norm(), (flat[2] - flat[1]).norm()});
+      least = std::min(least, std::abs(edges.determinant()) / longest);
+      corners.insert(corners.end(), flat.begin(), flat.end());
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t next = (k + 1) % 3;
+        const auto [low, high] = std::minmax(cloth.triangles[at][k], cloth.triangles[at][next]);
+        const Vector2d middle = flat[k] + flat[next];
+        ++sides
+              .try_emplace({cloth.piece[b], low, high, middle.x(), middle.y()}, 0,
+                           Border{cloth.piece[b], flat[k], flat[next]})
+              .first->second.first;
+      }
+    }
+    hull_.push_back(convex_hull(corners));
+    Box& box = box_.emplace_back();
+    for (const Vector2d& corner : corners) box.extend(corner);
+    least_height_.push_back(least);
+  }
+  for (const auto& [ends, side] : sides)
+    if (side.first != 2) borders_.push_back(side.second);
+  range_.resize(blocks);
+  known_.resize(blocks);
+}
+
+void FlatPatches::set(const Matrix3Xd& x) {
+  x_ = &x;
+  std::fill(known_.begin(), known_.end(), false);
+}
+
+double FlatPatches::distance(int one, int other) {
+  if (cloth_.piece[static_cast<std::size_t>(one)] != cloth_.piece[static_cast<std::size_t>(other)])
+    return 0;
+  const Patch& over = patch(one, other);
+  if (!over.whole) return 0;
+  Range all = range(over.blocks.front());
+  for (const int block : over.blocks) {
+    const Range& each = range(block);
+    all.low = all.low.cwiseMin(each.low);
+    all.high = all.high.cwiseMax(each.high);
+  }
+  const Gradient middle = (all.low + all.high) / 2;
+  const double differs = (all.high - all.low).norm() / 2;
+  const Eigen::Matrix2d square = middle.transpose() * middle;
+  const double least =
+      square.trace() / 2 - std::hypot((square(0, 0) - square(1, 1)) / 2, square(0, 1));
+  constexpr double kRounding = 1e-6;
+  return std::max(0.0, (std::sqrt(std::max(least, 0.0)) - differs - kRounding) * over.least_height);
+}
+
+// Over both blocks and what lies between them.
+const FlatPatches::Patch& FlatPatches::patch(int one, int other) {
+  const auto [low, high] = std::minmax(one, other);
+  const std::uint64_t key = static_cast<std::uint64_t>(low) << 32 | static_cast<unsigned>(high);
+  const auto [place, is_new] = patches_.try_emplace(key);
+  Patch& patch = place->second;
+  if (!is_new) return patch;
+
+  const auto a = static_cast<std::size_t>(low), b = static_cast<std::size_t>(high);
+  std::vector<Vector2d> corners = hull_[a];
+  corners.insert(corners.end(), hull_[b].begin(), hull_[b].end());
+  const Polygon hull = convex_hull(std::move(corners));
+  const int piece = cloth_.piece[a];
+  const double depth = 1e-9 * least_height_[a];
+  const Box box = box_[a].merged(box_[b]);
+  patch.whole = std::none_of(borders_.begin(), borders_.end(), [&](const Border& border) {
+    return border.piece == piece &&
+           box.intersects(Box(border.from.cwiseMin(border.to), border.from.cwiseMax(border.to))) &&
+           passes_inside(hull, border.from, border.to, depth);
+  });
+  if (!patch.whole) return patch;
+  patch.least_height = std::numeric_limits<double>::infinity();
+  for (std::size_t c = 0; c < hull_.size(); ++c) {
+    if (cloth_.piece[c] != piece || !box.intersects(box_[c]) || !may_meet(hull, hull_[c]) ||
+        !may_meet(hull_[c], hull))
+      continue;
+    patch.blocks.push_back(static_cast<int>(c));
+    patch.least_height = std::min(patch.least_height, least_height_[c]);
+  }
+  return patch;
+}
+
+const FlatPatches::Range& FlatPatches::range(int block) {
+  const auto b = static_cast<std::size_t>(block);
+  Range& range = range_[b];
+  if (known_[b]) return range;
+  known_[b] = true;
+  range.low.setConstant(std::numeric_limits<double>::infinity());
+  range.high = -range.low;
+  for (int t = cloth_.first_block[b]; t < cloth_.first_block[b + 1]; ++t) {
+    const auto at = static_cast<std::size_t>(t);
+    const auto& [i, j, k] = cloth_.triangles[at];
+    Gradient sides;
+    sides << x_->col(j) - x_->col(i), x_->col(k) - x_->col(i);
+    const Gradient gradient = sides * inverse_[at];
+    range.low = range.low.cwiseMin(gradient);
+    range.high = range.high.cwiseMax(gradient);
+  }
+  return range;
+}
+
+}  // namespace weft

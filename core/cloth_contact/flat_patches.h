@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "core/cloth_contact/cloth.h"
+
+namespace weft {
+
+// Tells where cloth lies so flat that it cannot be near itself. Let x(u) be the sheet over its flat
+// shape, and H convex there and without border inside. If the gradients of all triangles over H
+// differ from one matrix F by less than e, then |x(u) - x(v)| >= (s - e) |u - v| for u and v in H,
+// s the smaller singular value of F: the way from u to v leads through these triangles alone. And
+// what shares no particle is no nearer to each other in H than triangles are high.
+class FlatPatches {
+ public:
+  explicit FlatPatches(const Cloth& cloth);
+
+  // From now on cloth is at x, (3 x particles) m, which outlives what is asked.
+  void set(const Matrix3Xd& x);
+  // The least distance between particles and edges of two blocks, or within one, that share no
+  // particle, at least, m; 0 where none is known.
+  double distance(int one, int other);
+
+ private:
+  using Gradient = Eigen::Matrix<double, 3, 2>;
+  struct Range {
+    Gradient low, high;
+  };
+  using Box = Eigen::AlignedBox2d;
+  using Polygon = std::vector<Vector2d>;  // convex, anticlockwise
+  struct Patch {
+    bool whole = false;       // no border lies inside
+    double least_height = 0;  // of its triangles, m
+    std::vector<int> blocks;
+  };
+  struct Border {
+    int piece;
+    Vector2d from, to;
+  };
+
+  const Patch& patch(int one, int other);
+  const Range& range(int block);
+
+  const Cloth& cloth_;
+  std::vector<Eigen::Matrix2d> inverse_;  // of each triangle's sides in the flat shape, 1/m
+  std::vector<Polygon> hull_;             // of each block
+  std::vector<Box> box_;                  // around these
+  std::vector<double> least_height_;      // of each block, m
+  std::vector<Border> borders_;
+  std::unordered_map<std::uint64_t, Patch> patches_;
+
+  const Matrix3Xd* x_ = nullptr;
+  std::vector<Range> range_;  // of each block
+  std::vector<bool> known_;   // which of them are of x
+};
+
+}  // namespace weft

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <compare>
+#include <vector>
+
+#include "core/cloth_contact/flat_patches.h"
+
+namespace weft {
+
+// Two blocks of a cloth's triangles, one <= other.
+struct BlockPair {
+  int one = 0, other = 0;
+  auto operator<=>(const BlockPair&) const = default;
+};
+
+// Finds what is near by boxes around blocks of triangles, and around blocks of blocks.
+class NearBlocks {
+ public:
+  using Box = Eigen::AlignedBox3d;
+
+  explicit NearBlocks(const Cloth& cloth);
+
+  int blocks() const { return static_cast<int>(box_.size()); }
+  // From now on cloth is at x, (3 x particles) m, which outlives what is asked.
+  void set(const Matrix3Xd& x);
+  // Two blocks, or a block and itself, whose boxes are no farther apart than `reach`, m, along any
+  // axis; in ascending order.
+  std::vector<BlockPair> meet(double reach);
+  // The least distance between what shares no particle in two blocks, at least, m; 0 where that
+  // takes a closer look.
+  double distance(const BlockPair& blocks);
+  // Calls f(one, other) for every two triangles of two blocks whose boxes are no farther apart than
+  // `reach`, m.
+  template <class F>
+  void for_each_near(const BlockPair& blocks, double reach, const F& f) {
+    choose(blocks.one, blocks.other, reach, near_one_);
+    choose(blocks.other, blocks.one, reach, near_other_);
+    for (const int s : near_one_)
+      for (const int t : near_other_)
+        if ((blocks.one != blocks.other || s < t) && gap(triangle_box(s), triangle_box(t)) <= reach)
+          f(s, t);
+  }
+  // Calls f(block, particle) for the particles of every block.
+  template <class F>
+  void for_each_particle(const F& f) const {
+    for (std::size_t b = 0; b < box_.size(); ++b)
+      for (int k = first_particle_[b]; k < first_particle_[b + 1]; ++k)
+        f(b, particles_[static_cast<std::size_t>(k)]);
+  }
+
+ private:
+  // Blocks first ... last - 1; its halves are 2 number and 2 number + 1.
+  struct Node {
+    int number, first, last;
+    int count() const { return last - first; }
+    Node half(int which) const {
+      const int middle = (first + last) / 2;
+      return which == 0 ? Node{2 * number, first, middle} : Node{2 * number + 1, middle, last};
+    }
+  };
+
+  // Along the axis on which they are farthest apart, m.
+  static double gap(const Box& one, const Box& other) {
+    return (one.min() - other.max()).cwiseMax(other.min() - one.max()).maxCoeff();
+  }
+  const Box& block_box(int block);
+  Box& box(const Node& node) { return nodes_[static_cast<std::size_t>(node.number)]; }
+  const Box& triangle_box(int triangle) const {
+    return triangle_box_[static_cast<std::size_t>(triangle)];
+  }
+  void box_node(const Node& node);
+  void box_triangles(std::size_t block);
+  void meet_within(const Node& node);
+  void meet_between(const Node& one, const Node& other);
+  void choose(int block, int near, double reach, std::vector<int>& triangles);
+
+  const Cloth& cloth_;
+  FlatPatches flat_;
+  std::vector<int> first_particle_, particles_;  // of each block
+  std::vector<Box> nodes_, box_, triangle_box_;  // empty where not known
+  std::vector<bool> boxed_;                      // of each block: its triangles
+
+  const Matrix3Xd* x_ = nullptr;
+  double reach_ = 0;
+  std::vector<BlockPair> met_;
+  std::vector<int> near_one_, near_other_;
+};
+
+}  // namespace weft

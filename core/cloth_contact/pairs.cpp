@@ -1,0 +1,139 @@
+#include "core/cloth_contact/pairs.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "core/cloth_contact/nearest.h"
+
+namespace weft {
+namespace {
+
+const std::array<int, 3>& corners_of(const Cloth& cloth, int triangle) {
+  return cloth.triangles[static_cast<std::size_t>(triangle)];
+}
+const std::array<int, 2>& ends_of(const Cloth& cloth, int edge) {
+  return cloth.edges[static_cast<std::size_t>(edge)];
+}
+double thickness_at(const Cloth& cloth, int particle) {
+  return cloth.thickness[static_cast<std::size_t>(particle)];
+}
+
+// Half of one sheet's thickness and half of the other's; on one sheet the smaller one.
+double thickness_between(const Cloth& cloth, int one, double one_thickness, int other,
+                         double other_thickness) {
+  return cloth.sheet_of(one) == cloth.sheet_of(other) ? std::min(one_thickness, other_thickness)
+                                                      : (one_thickness + other_thickness) / 2;
+}
+
+bool share_end(const std::array<int, 2>& one, const std::array<int, 2>& other) {
+  return one[0] == other[0] || one[0] == other[1] || one[1] == other[0] || one[1] == other[1];
+}
+bool has(const std::array<int, 3>& triangle, int particle) {
+  return triangle[0] == particle || triangle[1] == particle || triangle[2] == particle;
+}
+
+// Whether they come within `reach` of each other along every axis.
+bool boxes_meet(const Vector3d& low, const Vector3d& high, const Vector3d& other_low,
+                const Vector3d& other_high, double reach) {
+  for (Eigen::Index axis = 0; axis < 3; ++axis)
+    if (other_low[axis] - high[axis] >= reach || low[axis] - other_high[axis] >= reach)
+      return false;
+  return true;
+}
+
+}  // namespace
+
+double thickness_of_corner(const Cloth& cloth, int particle, int triangle) {
+  const auto& [a, b, c] = corners_of(cloth, triangle);
+  const double least =
+      std::min({thickness_at(cloth, a), thickness_at(cloth, b), thickness_at(cloth, c)});
+  return thickness_between(cloth, particle, thickness_at(cloth, particle), a, least);
+}
+
+double thickness_of_edges(const Cloth& cloth, int one, int other) {
+  const auto& [a, b] = ends_of(cloth, one);
+  const auto& [c, d] = ends_of(cloth, other);
+  return thickness_between(cloth, a, std::min(thickness_at(cloth, a), thickness_at(cloth, b)), c,
+                           std::min(thickness_at(cloth, c), thickness_at(cloth, d)));
+}
+
+bool near_corner(const Cloth& cloth, const Matrix3Xd& x, int particle, int triangle, double reach) {
+  const auto& [i, j, k] = corners_of(cloth, triangle);
+  const double within = thickness_of_corner(cloth, particle, triangle) + reach;
+  const Vector3d p = x.col(particle), a = x.col(i), b = x.col(j), c = x.col(k);
+  if (!boxes_meet(p, p, a.cwiseMin(b).cwiseMin(c), a.cwiseMax(b).cwiseMax(c), within)) return false;
+  const auto [u, v, w] = nearest_in_triangle(p, a, b, c);
+  return (p - u * a - v * b - w * c).squaredNorm() < within * within;
+}
+
+bool near_edges(const Cloth& cloth, const Matrix3Xd& x, int one, int other, double reach) {
+  const auto& [i, j] = ends_of(cloth, one);
+  const auto& [k, l] = ends_of(cloth, other);
+  const double within = thickness_of_edges(cloth, one, other) + reach;
+  const Vector3d a = x.col(i), b = x.col(j), c = x.col(k), d = x.col(l);
+  if (!boxes_meet(a.cwiseMin(b), a.cwiseMax(b), c.cwiseMin(d), c.cwiseMax(d), within)) return false;
+  const auto [s, t] = nearest_on_edges(a, b, c, d);
+  return (a + s * (b - a) - c - t * (d - c)).squaredNorm() < within * within;
+}
+
+std::vector<ClothPairs> all_pairs(const Cloth& cloth) {
+  std::vector<int> particle_block(static_cast<std::size_t>(cloth.particles())), edge_block;
+  const int blocks = static_cast<int>(cloth.first_block.size()) - 1;
+  for (int b = 0; b < blocks; ++b) {
+    const auto first = static_cast<std::size_t>(cloth.first_block[static_cast<std::size_t>(b)]),
+               last = static_cast<std::size_t>(cloth.first_block[static_cast<std::size_t>(b) + 1]);
+    edge_block.resize(static_cast<std::size_t>(cloth.first_edge[last]), b);
+    for (int k = cloth.first_corner[first]; k < cloth.first_corner[last]; ++k)
+      particle_block[static_cast<std::size_t>(cloth.corners[static_cast<std::size_t>(k)])] = b;
+  }
+  std::map<BlockPair, ClothPairs> lists;
+  const auto list = [&](int one, int other) -> ClothPairs& {
+    return lists[{std::min(one, other), std::max(one, other)}];
+  };
+  for (int i = 0; i < cloth.particles(); ++i)
+    for (int b = 0, t = 0; b < blocks; ++b)
+      for (; t < cloth.first_block[static_cast<std::size_t>(b) + 1]; ++t)
+        if (!has(corners_of(cloth, t), i))
+          list(particle_block[static_cast<std::size_t>(i)], b).corners.push_back({i, t});
+  const int edges = static_cast<int>(cloth.edges.size());
+  for (int e = 0; e < edges; ++e)
+    for (int f = e + 1; f < edges; ++f)
+      if (!share_end(ends_of(cloth, e), ends_of(cloth, f)))
+        list(edge_block[static_cast<std::size_t>(e)], edge_block[static_cast<std::size_t>(f)])
+            .edges.push_back({e, f});
+  std::vector<ClothPairs> all;
+  for (auto& [blocks_of_list, pairs] : lists) all.push_back(std::move(pairs));
+  return all;
+}
+
+ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
+                      const Matrix3Xd& x, double reach) {
+  ClothPairs found;
+  const auto corners = [&](int from, int triangle) {
+    const auto f = static_cast<std::size_t>(from);
+    for (int k = cloth.first_corner[f]; k < cloth.first_corner[f + 1]; ++k) {
+      const int i = cloth.corners[static_cast<std::size_t>(k)];
+      if (!has(corners_of(cloth, triangle), i) && near_corner(cloth, x, i, triangle, reach))
+        found.corners.push_back({i, triangle});
+    }
+  };
+  const auto edges = [&](int one, int other) {
+    const auto s = static_cast<std::size_t>(one), t = static_cast<std::size_t>(other);
+    for (int e = cloth.first_edge[s]; e < cloth.first_edge[s + 1]; ++e)
+      for (int f = cloth.first_edge[t]; f < cloth.first_edge[t + 1]; ++f)
+        if (!share_end(ends_of(cloth, e), ends_of(cloth, f)) && near_edges(cloth, x, e, f, reach))
+          found.edges.push_back({std::min(e, f), std::max(e, f)});
+  };
+  const double thickest = *std::max_element(cloth.thickness.begin(), cloth.thickness.end());
+  near.for_each_near(blocks, thickest + reach, [&](int one, int other) {
+    corners(one, other);
+    corners(other, one);
+    edges(one, other);
+  });
+  std::sort(found.corners.begin(), found.corners.end());
+  std::sort(found.edges.begin(), found.edges.end());
+  return found;
+}
+
+}  // namespace weft

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <compare>
+#include <vector>
+
+#include "core/cloth_contact/near_blocks.h"
+
+namespace weft {
+
+// Numbers of a particle and a triangle, or of two edges.
+struct ClothPair {
+  int first = 0, second = 0;
+  auto operator<=>(const ClothPair&) const = default;
+};
+
+// Pairs of cloth that share no particle, in ascending order.
+struct ClothPairs {
+  std::vector<ClothPair> corners;  // particles and triangles
+  std::vector<ClothPair> edges;
+
+  bool empty() const { return corners.empty() && edges.empty(); }
+  bool operator==(const ClothPairs&) const = default;
+};
+
+// The distance at which cloth keeps these apart, m.
+double thickness_of_corner(const Cloth& cloth, int particle, int triangle);
+double thickness_of_edges(const Cloth& cloth, int one, int other);
+
+// Whether they are nearer to each other at x, (3 x particles) m, than their thickness and `reach`,
+// m.
+bool near_corner(const Cloth& cloth, const Matrix3Xd& x, int particle, int triangle, double reach);
+bool near_edges(const Cloth& cloth, const Matrix3Xd& x, int one, int other, double reach);
+
+// All pairs there are, one list for each two blocks.
+std::vector<ClothPairs> all_pairs(const Cloth& cloth);
+
+// Those between two blocks, at x where `near` has its boxes, that are nearer to each other than
+// their thickness and `reach`, m.
+ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
+                      const Matrix3Xd& x, double reach);
+
+}  // namespace weft

@@ -1,0 +1,69 @@
+#include "core/cloth_contact/tangles.h"
+
+#include <algorithm>
+#include <span>
+
+#include "core/cloth_contact/cuts.h"
+#include "core/cloth_contact/pairs.h"
+#include "core/model/text.h"
+
+namespace weft {
+namespace {
+
+constexpr std::size_t kMostTold = 3;
+
+std::string name_particles(const Scene& scene, std::size_t sheet, std::span<const int> particles) {
+  std::string text = join(scene.sheets[sheet].name, " ");
+  for (std::size_t k = 0; k < particles.size(); ++k) text += join(k == 0 ? "" : "-", particles[k]);
+  return text;
+}
+
+std::string describe_cuts(const Scene& scene, const ClothCuts& cuts) {
+  std::string text = join(cuts.count, " edges pass through triangles");
+  for (std::size_t k = 0; k < cuts.first.size(); ++k) {
+    const ClothCut& cut = cuts.first[k];
+    text += join(k == 0 ? ": " : ", ", name_particles(scene, cut.edge_sheet, cut.edge), " through ",
+                 name_particles(scene, cut.triangle_sheet, cut.triangle));
+  }
+  return text;
+}
+
+std::string describe_near(const Scene& scene, const Cloth& cloth, const ClothPairs& near) {
+  std::string text =
+      join(near.corners.size() + near.edges.size(), " pairs are nearer than their thickness");
+  for (std::size_t k = 0; k < std::min(kMostTold, near.corners.size()); ++k) {
+    const int i = near.corners[k].first;
+    const int own = cloth.own_number(i);
+    text += join(k == 0 ? ": at " : ", ",
+                 name_particles(scene, static_cast<std::size_t>(cloth.sheet_of(i)), {&own, 1}));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::optional<Warning> find_tangles(const Scene& scene, const std::vector<Matrix3Xd>& x) {
+  const Cloth cloth(scene.sheets);
+  Matrix3Xd all(3, cloth.particles());
+  for (std::size_t s = 0; s < x.size(); ++s)
+    all.middleCols(cloth.first_particle[s], x[s].cols()) = x[s];
+  NearBlocks blocks(cloth);
+  blocks.set(all);
+  constexpr double kRounding = 1e-9;  // m
+  const double thickest = *std::max_element(cloth.thickness.begin(), cloth.thickness.end());
+  ClothPairs near;
+  for (const BlockPair& each : blocks.meet(thickest)) {
+    if (blocks.distance(each) > thickest) continue;
+    const ClothPairs found = find_pairs(cloth, blocks, each, all, -kRounding);
+    near.corners.insert(near.corners.end(), found.corners.begin(), found.corners.end());
+    near.edges.insert(near.edges.end(), found.edges.begin(), found.edges.end());
+  }
+  const ClothCuts cuts = count_cuts(scene.sheets, x, kMostTold);
+  if (near.empty() && cuts.count == 0) return std::nullopt;
+  std::string text;
+  if (cuts.count > 0) text += describe_cuts(scene, cuts) + ". What has passed through stays so. ";
+  if (!near.empty()) text += describe_near(scene, cloth, near) + ". They are pushed apart";
+  return Warning{"TANGLED_START", "sheets", text};
+}
+
+}  // namespace weft

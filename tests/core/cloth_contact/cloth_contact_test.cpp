@@ -1,0 +1,320 @@
+#include "core/cloth_contact/cloth_contact.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/cloth_contact/cuts.h"
+#include "core/triangles/cut.h"
+#include "tests/support/core/scenes.h"
+
+namespace weft::testing {
+namespace {
+
+Textile soft_cloth(double friction = 0.3) {
+  Textile textile;
+  textile.model = MeasuredTextile{.areal_density = 0.2,
+                                  .tensile_warp = 200,
+                                  .tensile_weft = 200,
+                                  .shear = 20,
+                                  .bend_rigidity_warp = 1e-5,
+                                  .bend_rigidity_weft = 1e-5};
+  textile.friction = friction;
+  return textile;
+}
+
+SheetDefinition lattice(int rows, int columns, double spacing = 0.01) {
+  SheetDefinition sheet;
+  sheet.name = "lattice";
+  sheet.shape = Grid{rows, columns, spacing};
+  sheet.textile = soft_cloth();
+  sheet.bending = Isometric{};
+  return sheet;
+}
+
+SheetDefinition triangles(double length, double width, double spacing = 0.01) {
+  SheetDefinition sheet = lattice(2, 2);
+  sheet.name = "triangles";
+  sheet.shape = complete(triangle_mesh(cut_rectangle(Cut::kAlternating, length, width, spacing)));
+  return sheet;
+}
+
+Scene touching(const std::vector<SheetDefinition>& sheets) {
+  Scene scene;
+  scene.sheets = sheets;
+  scene.cloth_contact = true;
+  return scene;
+}
+
+std::vector<Matrix3Xd> by_sheet(const Simulation& simulation, const Matrix3Xd& all) {
+  std::vector<Matrix3Xd> x;
+  Eigen::Index first = 0;
+  for (const SheetDefinition& sheet : simulation.scene().sheets) {
+    x.emplace_back(all.middleCols(first, sheet.particle_count()));
+    first += sheet.particle_count();
+  }
+  return x;
+}
+
+std::int64_t cuts_now(const Simulation& simulation) {
+  return count_cuts(simulation.scene().sheets, by_sheet(simulation, positions(simulation))).count;
+}
+
+// Two sheets that meet crumpled and fast, one of each kind; without weight or air.
+Scene collision(Precision precision, unsigned seed = 1) {
+  SheetDefinition one = lattice(9, 9), other = triangles(0.08, 0.08);
+  other.origin = {0.003, 0.01, -0.002};
+  for (SheetDefinition* sheet : {&one, &other}) {
+    const int n = sheet->particle_count();
+    const double down = sheet == &other ? -1 : 1;
+    sheet->start_velocities =
+        values(((0.3 * noise(n, seed)).colwise() + Vector3d(0.2 * down, 0.6 * down, 0)).eval());
+    sheet->start_positions = values((start_positions(*sheet) + 1e-3 * noise(n, seed + 1)).eval());
+    seed += 2;
+  }
+  Scene scene = touching({one, other});
+  scene.environment.gravity.setZero();
+  scene.solver.precision = precision;
+  scene.solver.frame_step = 0.01;
+  return scene;
+}
+
+struct Momenta {
+  Vector3d linear = Vector3d::Zero(), angular = Vector3d::Zero();  // kg m/s, kg m^2/s
+};
+Momenta momenta(const Simulation& simulation) {
+  const Matrix3Xd x = positions(simulation), v = velocities(simulation);
+  Momenta sum;
+  Eigen::Index k = 0;
+  for (const SheetDefinition& sheet : simulation.scene().sheets) {
+    const Mesh mesh = make_mesh(sheet);
+    for (Eigen::Index i = 0; i < mesh.mass.size(); ++i, ++k) {
+      const Vector3d momentum = mesh.mass[i] * v.col(k);
+      sum.linear += momentum;
+      sum.angular += x.col(k).cross(momentum);
+    }
+  }
+  return sum;
+}
+
+TEST(ClothContact, KeepsMomentumAndAngularMomentum) {
+  Scene scene = collision(Precision::kDouble);
+  for (SheetDefinition& sheet : scene.sheets) {
+    sheet.textile.damping = 0;
+    sheet.textile.friction = 0;
+  }
+  Simulation simulation(scene);
+  const Momenta before = momenta(simulation);
+  for (int frame = 0; frame < 12; ++frame) ASSERT_TRUE(simulation.advance_frame());
+  const Momenta after = momenta(simulation);
+  const double mass = 2 * 0.2 * 0.0064, speed = 0.6, reach = 0.1;
+  EXPECT_LT((after.linear - before.linear).norm(), 1e-9 * mass * speed);
+  EXPECT_LT((after.angular - before.angular).norm(), 5e-3 * mass * speed * reach);
+
+  scene.cloth_contact = false;
+  Simulation passing(scene);
+  for (int frame = 0; frame < 12; ++frame) ASSERT_TRUE(passing.advance_frame());
+  EXPECT_GT((positions(passing) - positions(simulation)).colwise().norm().maxCoeff(), 0.01);
+}
+
+TEST(ClothContact, ASheetComesToLieOnAnotherAtItsThickness) {
+  SheetDefinition below = triangles(0.1, 0.1), above = triangles(0.1, 0.1);
+  above.name = "above";
+  above.origin = {0.002, 0.006, 0.003};
+  below.thickness = 1.5e-3;
+  above.thickness = 2.5e-3;
+  Scene scene = touching({below, above});
+  scene.colliders.push_back({"floor", Plane{Vector3d(0, -0.001, 0)}, 0.5, {}});
+  Simulation simulation(scene);
+  for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(simulation.advance_frame());
+  const std::vector<Matrix3Xd> x = by_sheet(simulation, positions(simulation));
+  const double apart = x[1].row(1).mean() - x[0].row(1).mean();
+  EXPECT_NEAR(apart, 2e-3, 1e-4);
+  EXPECT_EQ(cuts_now(simulation), 0);
+}
+
+// Bit for bit, with the solvers that vectors have and with plain ones.
+TEST(ClothContact, MissesNoPairThatAPlainSearchOfAllInEverySubstepFinds) {
+  for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
+    for (const unsigned seed : {1, 10}) {
+      SCOPED_TRACE(seed);
+      Scene listed = collision(precision, seed);
+      listed.solver.frame_step = 0.005;
+      Scene plain = listed;
+      plain.solver.plain = true;
+      const SolverFactory fast = [](const Scene& scene, const SheetDefinition& sheet,
+                                    const Mesh& mesh, const Dynamics& dynamics) {
+        Scene other = scene;
+        other.solver.plain = false;
+        return make_solver(other, sheet, mesh, dynamics);
+      };
+      Simulation one(listed, fast), other(plain, fast);
+      const std::vector<Matrix3Xd> start = by_sheet(one, positions(one));
+      for (int frame = 0; frame < 8; ++frame) {
+        ASSERT_TRUE(one.advance_frame());
+        ASSERT_TRUE(other.advance_frame());
+        ASSERT_EQ(positions(one), positions(other)) << frame;
+      }
+    }
+  }
+}
+
+class Threads : public ThreadPool {
+ public:
+  explicit Threads(int threads) : threads_(threads) {}
+  int threads() const override { return threads_; }
+  void run(int parts, const std::function<void(int)>& part) override {
+    for (int k = parts - 1; k >= 0; --k) part(k);
+  }
+
+ private:
+  int threads_;
+};
+
+TEST(ClothContact, DoesNotDependOnThreads) {
+  SheetDefinition below = lattice(65, 128, 0.005), above = triangles(0.2, 0.2, 0.005);
+  above.origin.y() = 0.003;
+  above.start_velocities.assign(3 * static_cast<std::size_t>(above.particle_count()), -0.3);
+  Scene scene = touching({below, above});
+  scene.solver.frame_step = 0.004;
+  Simulation one(scene), other(scene);
+  Threads pool(4);
+  for (int frame = 0; frame < 1; ++frame) {
+    ASSERT_TRUE(one.advance_frame());
+    ASSERT_TRUE(other.advance_frame(pool));
+  }
+  EXPECT_EQ(positions(one), positions(other));
+}
+
+TEST(ClothContact, GoesOnFromASnapshotToTheBit) {
+  for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
+    const Scene scene = collision(precision);
+    Simulation one(scene), other(scene);
+    for (int frame = 0; frame < 3; ++frame) ASSERT_TRUE(one.advance_frame());
+    ASSERT_TRUE(other.restore(one.snapshot()));
+    one.release_memory();
+    for (int frame = 0; frame < 3; ++frame) {
+      ASSERT_TRUE(one.advance_frame());
+      ASSERT_TRUE(other.advance_frame());
+    }
+    EXPECT_EQ(positions(one), positions(other));
+  }
+}
+
+// A patch on a sheet that is pinned all over and inclined.
+double slide(double friction, double angle) {
+  SheetDefinition slope = triangles(0.3, 0.1), patch = triangles(0.04, 0.04);
+  patch.name = "patch";
+  const Quaterniond turn(Eigen::AngleAxisd(-angle, Vector3d::UnitZ()));
+  const double thickness = 2e-3;
+  slope.rotation = patch.rotation = turn;
+  patch.origin = turn * Vector3d(0.053, thickness, 0.031);
+  for (SheetDefinition* sheet : {&slope, &patch}) sheet->textile = soft_cloth(friction);
+  Pin& all = slope.pins.emplace_back();
+  for (int i = 0; i < slope.particle_count(); ++i) all.particles.push_back(i);
+  Simulation simulation(touching({slope, patch}));
+  const auto way = [&] {
+    return Vector3d(by_sheet(simulation, positions(simulation))[1].rowwise().mean())
+        .dot(turn * Vector3d::UnitX());
+  };
+  for (int frame = 0; frame < 15; ++frame) EXPECT_TRUE(simulation.advance_frame());
+  const double begin = way();
+  for (int frame = 0; frame < 30; ++frame) EXPECT_TRUE(simulation.advance_frame());
+  return way() - begin;
+}
+
+TEST(ClothContact, APatchSlidesDownAnInclinedSheetBeyondTheAngleOfFriction) {
+  const double half_degree = std::numbers::pi / 360;
+  for (const double friction : {0.2, 0.5}) {
+    const double angle = std::atan(friction);
+    EXPECT_LT(slide(friction, angle - half_degree), 2e-4) << friction;
+    EXPECT_GT(slide(friction, angle + half_degree), 2e-3) << friction;
+  }
+}
+
+TEST(ClothContact, AStripTwistedAndBackDoesNotPassThroughItself) {
+  SheetDefinition band = triangles(0.2, 0.1);
+  Matrix3Xd x = start_positions(band);
+  constexpr double kTurns = 1.5, kTime = 1.0;
+  const double length = 0.2, middle = 0.05;
+  for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    const double end = x(0, i) < 1e-9 ? -1 : x(0, i) > length - 1e-9 ? 1 : 0;
+    if (end == 0) continue;
+    Pin& pin = band.pins.emplace_back();
+    pin.particles = {static_cast<int>(i)};
+    constexpr int kKeys = 200;
+    for (int k = 0; k <= kKeys; ++k) {
+      const double share = 1 - std::abs(1 - 2.0 * k / kKeys);
+      const double angle = end * std::numbers::pi * kTurns * share, z = x(2, i) - middle;
+      pin.path.push_back(
+          {kTime * k / kKeys, {-end * 0.04 * share, z * std::sin(angle), z * std::cos(angle) - z}});
+    }
+  }
+  band.start_positions = values((x + 1e-5 * noise(static_cast<int>(x.cols()))).eval());
+  Scene scene = touching({band});
+  scene.environment.gravity.setZero();
+  Simulation simulation(scene);
+  std::int64_t cuts = 0;
+  for (int frame = 0; frame < 66; ++frame) {
+    ASSERT_TRUE(simulation.advance_frame());
+    cuts += cuts_now(simulation);
+  }
+  EXPECT_EQ(cuts, 0);
+}
+
+TEST(ClothContact, ASheetPouredIntoAHeapDoesNotPassThroughItself) {
+  SheetDefinition sheet = triangles(0.2, 0.2);
+  const Matrix3Xd flat = start_positions(sheet);
+  Matrix3Xd upright(3, flat.cols());
+  for (Eigen::Index i = 0; i < flat.cols(); ++i)
+    upright.col(i) = Vector3d(flat(0, i), flat(2, i) + 0.01, 0.01 * std::sin(40 * flat(2, i)));
+  sheet.start_positions = values(upright);
+  Scene scene = touching({sheet});
+  scene.colliders.push_back({"floor", Plane{}, 0.5, {}});
+  Simulation simulation(scene);
+  std::int64_t cuts = 0;
+  for (int frame = 0; frame < 45; ++frame) {
+    ASSERT_TRUE(simulation.advance_frame());
+    cuts += cuts_now(simulation);
+  }
+  EXPECT_EQ(cuts, 0);
+  EXPECT_LT(positions(simulation).row(1).maxCoeff(), 0.1);
+}
+
+TEST(ClothContact, ThicknessIsBoundedByTheMesh) {
+  Scene scene = touching({lattice(3, 3)});
+  EXPECT_EQ(scene.sheets[0].thickness_or_default(), 2e-3);
+  scene.sheets[0].thickness = 2.6e-3;
+  const std::vector<Problem> problems = find_problems(scene);
+  ASSERT_EQ(problems.size(), 1u);
+  EXPECT_EQ(problems[0].field, "sheets[0].thickness_m");
+  EXPECT_EQ(problems[0].message, "0.0026 m is not within 1e-06 to 0.0025 m");
+  scene.sheets[0] = lattice(3, 3, 0.004);
+  EXPECT_EQ(scene.sheets[0].thickness_or_default(), 1e-3);
+}
+
+TEST(ClothContact, IsAskedForAndThenNotWarnedOf) {
+  Scene scene = touching({lattice(3, 3), triangles(0.02, 0.02)});
+  scene.sheets[1].origin.y() = 0.1;
+  const auto codes = [&] {
+    std::vector<std::string> found;
+    const Simulation simulation(scene);
+    for (const Warning& warning : simulation.plan().warnings)
+      if (warning.code.find("COLLISION") != std::string::npos || warning.code == "TANGLED_START")
+        found.push_back(warning.code);
+    return found;
+  };
+  EXPECT_EQ(codes(), std::vector<std::string>{});
+  scene.sheets[1].origin.y() = 0.001;
+  EXPECT_EQ(codes(), std::vector<std::string>{"TANGLED_START"});
+  scene.cloth_contact = false;
+  EXPECT_EQ(codes(), (std::vector<std::string>{"NO_SELF_COLLISION", "NO_SHEET_SHEET_COLLISION"}));
+  EXPECT_TRUE(wants_cloth_contact(scene));
+  scene.sheets.pop_back();
+  EXPECT_FALSE(wants_cloth_contact(scene));
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -1,0 +1,95 @@
+#include "core/cloth_contact/near_blocks.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/cloth_contact/pairs.h"
+#include "core/triangles/cut.h"
+#include "tests/support/core/scenes.h"
+#include "tests/support/core/triangle_meshes.h"
+
+namespace weft::testing {
+namespace {
+
+SheetDefinition sheet_of(const RestShape& shape) {
+  SheetDefinition sheet = flat_sheet(2, 2);
+  sheet.shape = complete(triangle_mesh(shape));
+  return sheet;
+}
+
+// Rolled up about z so often within its length, and rough.
+Matrix3Xd rolled(const SheetDefinition& sheet, double turns, double roughness) {
+  Matrix3Xd x = start_positions(sheet);
+  const double length = x.row(0).maxCoeff();
+  for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    const double angle = 2 * 3.14159 * turns * x(0, i) / length;
+    const double radius = length / (2 * 3.14159 * turns) * (1 + 0.02 * angle);
+    x(0, i) = radius * std::sin(angle);
+    x(1, i) = radius * (1 - std::cos(angle));
+  }
+  return x + roughness * noise(static_cast<int>(x.cols()));
+}
+
+std::size_t size(const std::vector<ClothPairs>& lists) {
+  std::size_t sum = 0;
+  for (const ClothPairs& pairs : lists) sum += pairs.corners.size() + pairs.edges.size();
+  return sum;
+}
+
+TEST(NearBlocks, HaveEveryPairWithinReach) {
+  const std::vector<SheetDefinition> sheets = {flat_sheet(17, 17, 0.01),
+                                               sheet_of(square(Cut::kIrregular, 0.16, 0.01)),
+                                               sheet_of(cut_disc(Cut::kAlternating, 0.08, 0.01))};
+  for (const SheetDefinition& sheet : sheets) {
+    const Cloth cloth({sheet});
+    NearBlocks near(cloth);
+    const std::vector<ClothPairs> all = all_pairs(cloth);
+    const double thickest = sheet.thickness_or_default();
+    std::size_t most = 0;
+    for (const double turns : {0.01, 0.2, 0.5, 1.0, 3.0}) {
+      for (const double reach : {0.0, 1e-3, 4e-3}) {
+        SCOPED_TRACE(::testing::Message() << turns << " turns, reach " << reach);
+        const Matrix3Xd x = rolled(sheet, turns, 3e-4);
+        std::vector<ClothPairs> expected;
+        for (const ClothPairs& list : all) {
+          ClothPairs some;
+          for (const auto& [i, t] : list.corners)
+            if (near_corner(cloth, x, i, t, reach)) some.corners.push_back({i, t});
+          for (const auto& [e, f] : list.edges)
+            if (near_edges(cloth, x, e, f, reach)) some.edges.push_back({e, f});
+          if (!some.empty()) expected.push_back(some);
+        }
+        std::vector<ClothPairs> found;
+        near.set(x);
+        for (const BlockPair& blocks : near.meet(thickest + reach)) {
+          if (near.distance(blocks) > thickest + reach) continue;
+          const ClothPairs some = find_pairs(cloth, near, blocks, x, reach);
+          if (!some.empty()) found.push_back(some);
+        }
+        EXPECT_TRUE(found == expected) << size(found) << " of " << size(expected);
+        most = std::max(most, size(expected));
+      }
+    }
+    EXPECT_GT(most, 1000u);
+  }
+}
+
+TEST(NearBlocks, AreKnownToBeApartWhereClothLiesFlat) {
+  const SheetDefinition sheet = flat_sheet(65, 65, 0.01);
+  const Cloth cloth({sheet});
+  NearBlocks near(cloth);
+  const auto unknown = [&](double turns) {
+    const Matrix3Xd x = rolled(sheet, turns, 0);
+    near.set(x);
+    int count = 0;
+    for (const BlockPair& blocks : near.meet(4e-3)) count += near.distance(blocks) < 4e-3 ? 1 : 0;
+    return count;
+  };
+  EXPECT_EQ(unknown(0.2), 0);
+  EXPECT_GT(unknown(3), 0);
+}
+
+}  // namespace
+}  // namespace weft::testing

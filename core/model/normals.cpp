@@ -7,9 +7,10 @@ namespace weft {
 namespace {
 
 using ConstPlanes = Eigen::Map<const Eigen::MatrixX3d>;
-using Planes = Eigen::Map<Eigen::MatrixX3d>;
+using NormalPlanes = Eigen::Map<Eigen::MatrixX3d>;
 
-void set_normals(const Grid& sheet, const ConstPlanes& x, Eigen::Index first, Planes& normals) {
+void set_normals(const Grid& sheet, const ConstPlanes& x, Eigen::Index first,
+                 NormalPlanes& normals) {
   const auto index = [&](int row, int column) {
     return first + Eigen::Index{row} * sheet.columns + column;
   };
@@ -26,7 +27,7 @@ void set_normals(const Grid& sheet, const ConstPlanes& x, Eigen::Index first, Pl
 
 // Weighted by area, as cross products are.
 void set_normals(const Triangles& sheet, const ConstPlanes& x, Eigen::Index first,
-                 Planes& normals) {
+                 NormalPlanes& normals) {
   const auto particles = static_cast<Eigen::Index>(sheet->start.size());
   normals.middleRows(first, particles).setZero();
   for (const auto& [a, b, c] : sheet->triangles) {
@@ -45,7 +46,7 @@ std::vector<double> normals_of(const std::vector<double>& positions,
   const auto particles = static_cast<Eigen::Index>(positions.size() / 3);
   const ConstPlanes x(positions.data(), particles, 3);
   std::vector<double> values(positions.size());
-  Planes normals(values.data(), particles, 3);
+  NormalPlanes normals(values.data(), particles, 3);
   Eigen::Index first = 0;
   for (const SheetShape& sheet : sheets) {
     std::visit([&](const auto& shape) { set_normals(shape, x, first, normals); }, sheet);

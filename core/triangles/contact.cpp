@@ -34,7 +34,7 @@ template <class T>
 double resolve_block_as(const Contacts& contacts, const Vector3d& origin, bool compensated,
                         int block, TriangleState<T>& state) {
   const ContactTag d;
-  const Reals skin = real(contacts.skin()), far = real(std::numeric_limits<double>::infinity());
+  const Reals far = real(std::numeric_limits<double>::infinity());
   constexpr std::size_t kBlock = TriangleLaw<T>::kBlock, kValues = 4;
   const std::size_t begin = static_cast<std::size_t>(block) * kBlock * kValues;
   Reals nearest = far;
@@ -55,10 +55,7 @@ double resolve_block_as(const Contacts& contacts, const Vector3d& origin, bool c
 
     const auto free = hn::Gt(hn::Load(d, mobile), real(0));
     Places x = plus(everywhere(origin), exact(state.x, state.x_error));
-    Reals gap = far;
-    for (const Contacts::Placed& placed : contacts.placed())
-      gap = hn::Min(gap, hn::Sub(distances(placed, x).value, skin));
-    gap = hn::IfThenElse(free, gap, far);
+    const Reals gap = hn::IfThenElse(free, gaps(contacts, x), far);
     nearest = hn::Min(nearest, gap);
     const auto touching = hn::Lt(gap, real(0));
     if (hn::AllFalse(d, touching)) continue;

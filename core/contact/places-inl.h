@@ -97,6 +97,9 @@ HWY_INLINE Distances distances(const SharedBody& body, const Eigen::Matrix3d&,
   const ContactTag tag;
   const hn::Rebind<std::int32_t, ContactTag> ints;
   const hn::Rebind<float, ContactTag> floats;
+  const hn::Rebind<std::uint32_t, ContactTag> words;
+  const hn::RebindToSigned<ContactTag> offsets;
+  const hn::RebindToUnsigned<ContactTag> pairs;
   const DistanceGrid& grid = body->grid;
   constexpr double kBlock = DistanceGrid::kBlock;
   const double edge = kBlock * grid.cell;
@@ -131,10 +134,14 @@ HWY_INLINE Distances distances(const SharedBody& body, const Eigen::Matrix3d&,
     Reals value, slope;
   };
   const auto along_x = [&](Reals from) HWY_ATTR {
-    const auto i = hn::DemoteTo(ints, from);
-    const float* const values = grid.values.data();
-    const Reals a = hn::PromoteTo(tag, hn::GatherIndex(floats, values, i));
-    const Reals b = hn::PromoteTo(tag, hn::GatherIndex(floats, values + 1, i));
+    // two neighbours at a time
+    const auto bytes = hn::ShiftLeft<2>(hn::PromoteTo(offsets, hn::DemoteTo(ints, from)));
+    const auto pair =
+        hn::GatherOffset(pairs, reinterpret_cast<const std::uint64_t*>(grid.values.data()), bytes);
+    const auto read = [&](auto v) HWY_ATTR {
+      return hn::PromoteTo(tag, hn::BitCast(floats, hn::TruncateTo(words, v)));
+    };
+    const Reals a = read(pair), b = read(hn::ShiftRight<32>(pair));
     const Reals slope = hn::Sub(b, a);
     return Line{hn::MulAdd(slope, share.x, a), slope};
   };
@@ -171,25 +178,35 @@ HWY_INLINE Distances distances(const Contacts::Placed& placed, const Places& poi
   return distances(*std::get_if<Capsule>(&shape), placed.turn, at);
 }
 
-// See Contacts::gap().
-HWY_INLINE Reals gaps(const Contacts& contacts, const Places& x) {
-  Reals least = real(std::numeric_limits<double>::infinity());
-  for (const Contacts::Placed& placed : contacts.placed()) {
-    const Reals gap = hn::Sub(distances(placed, x).value, real(contacts.skin()));
-    least = hn::Min(least, placed.steepest == 1 ? gap : hn::Div(gap, real(placed.steepest)));
-  }
-  return least;
+// See Contacts::gap(); and the distances from the first collider. Precondition: there is one.
+struct Gaps {
+  Reals least;
+  Distances first;
+};
+HWY_INLINE Gaps gaps(const Contacts& contacts, const Places& x) {
+  const auto gap = [&](const Contacts::Placed& placed, Reals value) HWY_ATTR {
+    const Reals beyond = hn::Sub(value, real(contacts.skin()));
+    return placed.steepest == 1 ? beyond : hn::Div(beyond, real(placed.steepest));
+  };
+  const auto placed = contacts.placed();
+  const Distances first = distances(placed[0], x);
+  Reals least = gap(placed[0], first.value);
+  for (const Contacts::Placed& each : placed.subspan(1))
+    least = hn::Min(least, gap(each, distances(each, x).value));
+  return {least, first};
 }
 
-// See Contacts::resolve().
+// See Contacts::resolve(). first: distances of x from the first collider.
 template <class M>
-HWY_INLINE void resolve_places(const Contacts& contacts, M active, Places& x, Places& d) {
+HWY_INLINE void resolve_places(const Contacts& contacts, M active, const Distances& first,
+                               Places& x, Places& d) {
   const Reals zero = real(0), skin = real(contacts.skin());
   Reals pushed = zero;
   for (int round = 0; round < Contacts::kRounds; ++round) {
     Reals deepest = zero;
     for (const Contacts::Placed& placed : contacts.placed()) {
-      const auto [value, normal] = distances(placed, x);
+      const bool known = round == 0 && &placed == contacts.placed().data();
+      const auto [value, normal] = known ? first : distances(placed, x);
       const auto touching = hn::And(active, hn::Lt(value, skin));
       const Places relative = minus(d, everywhere(placed.carried));
       const Reals approach = dot(relative, normal);

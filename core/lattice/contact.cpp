@@ -66,14 +66,15 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
 
       const auto free = hn::Gt(Of::load(at(State::kStep2)), real(0));
       Places x = plus(from, exact(State::kX, State::kXError));
-      const Reals gap = hn::IfThenElse(free, gaps(contacts, x), far);
+      const Gaps found = gaps(contacts, x);
+      const Reals gap = hn::IfThenElse(free, found.least, far);
       nearest = hn::Min(nearest, gap);
       const auto touching = hn::Lt(gap, real(0));
       if (hn::AllFalse(ContactTag(), touching)) continue;
 
       const Places before = exact(State::kD, State::kDError);
       Places d = before;
-      resolve_places(contacts, touching, x, d);
+      resolve_places(contacts, touching, found.first, x, d);
 
       const auto store = [&](int plane, Reals v) HWY_ATTR {
         Of::store(hn::IfThenElse(touching, v, Of::load(at(plane))), at(plane));

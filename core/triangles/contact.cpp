@@ -55,14 +55,15 @@ double resolve_block_as(const Contacts& contacts, const Vector3d& origin, bool c
 
     const auto free = hn::Gt(hn::Load(d, mobile), real(0));
     Places x = plus(everywhere(origin), exact(state.x, state.x_error));
-    const Reals gap = hn::IfThenElse(free, gaps(contacts, x), far);
+    const Gaps found = gaps(contacts, x);
+    const Reals gap = hn::IfThenElse(free, found.least, far);
     nearest = hn::Min(nearest, gap);
     const auto touching = hn::Lt(gap, real(0));
     if (hn::AllFalse(d, touching)) continue;
 
     const Places before = exact(state.d, state.d_error);
     Places moved = before;
-    resolve_places(contacts, touching, x, moved);
+    resolve_places(contacts, touching, found.first, x, moved);
 
     HWY_ALIGN double touched[Lanes::kMost];
     hn::Store(hn::IfThenElseZero(touching, real(1)), d, touched);

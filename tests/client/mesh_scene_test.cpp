@@ -126,6 +126,26 @@ TEST_F(MeshScene, OfFaultyFilesNamesEveryPlace) {
               AllOf(HasSubstr("a.obj"), HasSubstr("line 2"), HasSubstr("line 3 (face 1)")));
 }
 
+TEST_F(MeshScene, HasBodiesFromFilesInTheUnitAskedFor) {
+  write_file(directory_.path("block.obj"),
+             "v -5 -5 -5\nv 5 -5 -5\nv -5 5 -5\nv 5 5 -5\n"
+             "v -5 -5 5\nv 5 -5 5\nv -5 5 5\nv 5 5 5\n"
+             "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n");
+  const std::string file = directory_.path("scene.json");
+  const Outcome made = run_weft({"scene", "new", "--template", "hang", "--body",
+                                 directory_.path("block.obj"), "--unit", "cm", "-o", file});
+  ASSERT_EQ(made.exit, 0) << made.err;
+  EXPECT_THAT(made.out, HasSubstr("block: 12 triangles"));
+  const v1::Scene scene = client::read_scene(file);
+  ASSERT_GE(scene.colliders_size(), 1);
+  const v1::Collider& body = *scene.colliders().rbegin();
+  EXPECT_EQ(body.name(), "block");
+  float first = 0;
+  std::memcpy(&first, body.mesh().data().positions_m().data(), sizeof first);
+  EXPECT_FLOAT_EQ(first, -0.05F);
+  EXPECT_EQ(run_weft({"scene", "check", file}).exit, 0);
+}
+
 TEST_F(MeshScene, IsWhatACheckOfAMeshLeadsTo) {
   write_file(directory_.path("shirt.obj"), lattice_obj({}));
   EXPECT_THAT(run_weft({"scene", "check", directory_.path("shirt.obj")}).err,

@@ -41,12 +41,9 @@ Eigen::AlignedBox3d box_of(const BodyMesh& mesh) {
 double cell_of(const BodyMesh& mesh, const BodySettings& settings) {
   constexpr double kMostReach = 6;  // cells
   const double surface = surface_of(mesh);
-  const double least = std::max(std::cbrt(box_of(mesh).volume() / kMostBlocks) / kCells,
-                                std::sqrt(surface / kMostSquares));
-  const double cell = settings.cell > 0 ? settings.cell
-                                        : std::max(std::sqrt(surface / kChosenSquares),
-                                                   settings.reach / kMostReach);
-  return std::max(cell, least);
+  const double wanted = settings.cell > 0 ? settings.cell : std::sqrt(surface / kChosenSquares);
+  return std::max({wanted, std::sqrt(surface / kMostSquares), settings.reach / kMostReach,
+                   std::cbrt(box_of(mesh).volume() / kMostBlocks) / kCells});
 }
 
 class GridMaker {

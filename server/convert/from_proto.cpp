@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <optional>
 #include <set>
@@ -327,7 +328,9 @@ void Reader::set_body(const v1::BodyMesh& from, const std::string& field, Collid
                    join(*collider.cell, " m is not within ", kLeast, " to ", kMost, " m"));
   const auto data = mesh(from, field + ".mesh");
   if (!data) return;
-  auto made = to_body(*data, collider.cell, largest_skin_, path);
+  // in steps, for scenes to share bodies
+  const double reach = std::exp2(std::ceil(std::log2(std::max(largest_skin_, 1e-3))));
+  auto made = to_body(*data, collider.cell, reach, path);
   if (auto* problems = std::get_if<std::vector<Problem>>(&made))
     std::move(problems->begin(), problems->end(), std::back_inserter(problems_));
   else

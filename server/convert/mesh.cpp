@@ -7,6 +7,9 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "core/contact/body.h"
@@ -58,6 +61,29 @@ void check_size(const std::string& bytes, std::size_t unit, const std::string& f
   if (bytes.size() % unit != 0)
     problems.push_back(
         {field, join("has ", bytes.size(), " bytes, which is no multiple of ", unit)});
+}
+
+// Sessions with the same body share it, as long as one of them is there.
+MadeBody shared_body(const v1::MeshData& from, const BodySettings& settings,
+                     const std::string& field) {
+  static std::mutex mutex;
+  static std::map<std::string, std::weak_ptr<const Body>> bodies;
+  const std::string key = from.positions_m() + from.triangles() +
+                          bytes_of(std::vector{static_cast<double>(from.positions_m().size()),
+                                               settings.cell, settings.reach});
+  {
+    const std::lock_guard lock(mutex);
+    const auto known = bodies.find(key);
+    if (known != bodies.end())
+      if (auto body = known->second.lock()) return {std::move(body), {}};
+  }
+  MadeBody made = make_body(
+      {points_of<Vector3d>(from.positions_m()), triangles_of(from.triangles())}, settings, field);
+  if (!made.body) return made;
+  const std::lock_guard lock(mutex);
+  std::erase_if(bodies, [](const auto& each) { return each.second.expired(); });
+  bodies[key] = made.body;
+  return made;
 }
 
 struct Edges {
@@ -144,10 +170,14 @@ Converted<SharedBody> to_body(const v1::MeshData& from, std::optional<double> ce
   std::vector<Problem> problems;
   check_size(from.positions_m(), 12, field + ".positions_m", problems);
   check_size(from.triangles(), sizeof(Triangle), field + ".triangles", problems);
+  const auto refuse = [&](bool given, const char* name) {
+    if (given) problems.push_back({join(field, ".", name), "is for sheets; a body has none"});
+  };
+  refuse(!from.flat_m().empty(), "flat_m");
+  refuse(!from.flat_triangles().empty(), "flat_triangles");
+  refuse(from.panels_size() > 0, "panels");
   if (!problems.empty()) return problems;
-  MadeBody made =
-      make_body({points_of<Vector3d>(from.positions_m()), triangles_of(from.triangles())},
-                {cell.value_or(0), reach}, field);
+  MadeBody made = shared_body(from, {cell.value_or(0), reach}, field);
   if (made.body) return std::move(made.body);
   return std::move(made.problems);
 }

@@ -55,7 +55,7 @@ ImportOptions placed(const MeshOptions& options) {
   return import;
 }
 
-void add_body(const std::string& path, const MeshOptions& options, NewScene& made) {
+void add_body_file(const std::string& path, const MeshOptions& options, NewScene& made) {
   const ImportedMesh mesh = import_body(path, placed(options));
   v1::Collider* body = made.scene.add_colliders();
   body->set_name(plain_name(std::filesystem::path(path).stem().string(), "body"));
@@ -100,7 +100,7 @@ NewScene new_scene(const NewOptions& options) {
 void run_new(Context& context, NewOptions options) {
   if (!options.textile.empty()) options.values.textile = textile_named(options.textile);
   NewScene made = new_scene(options);
-  for (const std::string& body : options.bodies) add_body(body, options.mesh, made);
+  for (const std::string& body : options.bodies) add_body_file(body, options.mesh, made);
   for (const std::string& field : options.fields) {
     const auto [place, value] = read_setting(field);
     set_field(made.scene, place, value);

@@ -24,7 +24,7 @@ struct Blob {
   Vector3d middle, radii;  // m
 };
 
-struct Plan {
+struct FigurePlan {
   double stature;
   std::vector<Section> torso;  // upwards
   std::optional<Blob> breast;  // the left one
@@ -36,7 +36,7 @@ struct Plan {
   Blob head;
 };
 
-Plan female() {
+FigurePlan female() {
   return {1.685,
           {{"gusset", .735, .420, 1.10, 2.00, -.006, .50},
            {"crotch", .770, .800, 1.45, 2.20, -.006, .48},
@@ -78,7 +78,7 @@ Plan female() {
           {{0, 1.60, .018}, {.074, .102, .090}}};
 }
 
-Plan male() {
+FigurePlan male() {
   return {1.80,
           {{"gusset", .765, .430, 1.10, 2.00, -.006, .50},
            {"crotch", .800, .830, 1.40, 2.20, -.006, .48},
@@ -218,9 +218,9 @@ double from_blob(const Vector3d& p, const Blob& blob) {
 }
 
 // Roughly the distance from a figure, negative inside. It is as its mirror image in x = 0.
-class Shape {
+class FigureShape {
  public:
-  Shape(const Plan& plan, double arm_angle)
+  FigureShape(const FigurePlan& plan, double arm_angle)
       : plan_(plan),
         depth_(section(half_depth)),
         width_(section([](const Section& s) { return s.ratio * half_depth(s); })),
@@ -261,15 +261,18 @@ class Shape {
   }
 
   double from_torso(const Vector3d& p) const {
+    constexpr double kFar = 0.1;  // m, beyond which nothing is blended
     const double low = plan_.torso.front().height, high = plan_.torso.back().height;
     const double y = std::clamp(p.y(), low, high);
     const double forward = p.z() - shift_(y), front = front_(y), n = exponent_(y);
     const double a = width_(y), b = 2 * (forward > 0 ? front : 1 - front) * depth_(y);
+    const double over = std::max(p.y() - high, low - p.y());
+    const double beyond = std::max({std::abs(p.x()) - a, std::abs(forward) - b, over});
+    if (beyond > kFar) return beyond;
     const double u = std::abs(p.x()) / a, v = std::abs(forward) / b;
     const double f = std::pow(std::pow(u, n) + std::pow(v, n) + 1e-12, 1 / n);
     const double slope = std::hypot(std::pow(u / f, n - 1) / a, std::pow(v / f, n - 1) / b);
     const double d = (f - 1) / std::max(slope, 1e-6);
-    const double over = std::max(p.y() - high, low - p.y());
     if (over <= 0) return d;
     return d > 0 ? std::hypot(d, over) : std::max(d, over);
   }
@@ -305,7 +308,7 @@ class Shape {
                      plan_.shoulder_radius - 0.012);
   }
 
-  const Plan& plan_;
+  const FigurePlan& plan_;
   Curve depth_, width_, exponent_, shift_, front_, leg_side_, leg_forward_, leg_radius_,
       arm_radius_;
   Vector3d arm_;
@@ -353,16 +356,16 @@ constexpr Taken kTaken[] = {{"hip", &Measures::hip},
                             {"underbust", &Measures::underbust},
                             {"bust", &Measures::bust}};
 
-Section& section_of(Plan& plan, const std::string& name) {
+Section& section_of(FigurePlan& plan, const std::string& name) {
   return *std::find_if(plan.torso.begin(), plan.torso.end(),
                        [&](const Section& section) { return section.name == name; });
 }
 
 // Of the plan as it stands.
-double bust_of(const Plan& plan) { return plan.breast ? 0.925 : 1.0; }
+double bust_of(const FigurePlan& plan) { return plan.breast ? 0.925 : 1.0; }
 
 // Heights by `tall`, all that lies across by `wide`.
-void scale(Plan& plan, double tall, double wide) {
+void scale(FigurePlan& plan, double tall, double wide) {
   const Vector3d by(wide, tall, wide);
   plan.stature *= tall;
   for (Section& section : plan.torso) {
@@ -389,7 +392,7 @@ void scale(Plan& plan, double tall, double wide) {
 
 DressForm make_dress_form(const Measures& measures) {
   constexpr double kCell = 0.012;  // m
-  Plan plan = measures.figure == Figure::kFemale ? female() : male();
+  FigurePlan plan = measures.figure == FigureKind::kFemale ? female() : male();
   const double tall = measures.stature.value_or(plan.stature) / plan.stature;
 
   // what was given says how stout the rest is
@@ -420,9 +423,9 @@ DressForm make_dress_form(const Measures& measures) {
 
   // sections follow what the tape finds
   constexpr int kRounds = 8;
-  constexpr double kClose = 1e-3;  // m
+  constexpr double kClose = 3e-3;  // m
   for (int round = 0; round < kRounds; ++round) {
-    const Shape shape(plan, measures.arm_angle);
+    const FigureShape shape(plan, measures.arm_angle);
     const double reach = plan.shoulder.x() + plan.arm.back().along + 0.2, deep = 0.2 + 0.15 * wide;
     form.mesh =
         surface_of(shape, {-reach, -0.03, -deep}, {reach, plan.stature + 0.08, deep}, kCell);

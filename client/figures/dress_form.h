@@ -8,11 +8,11 @@
 
 namespace weft::client {
 
-enum class Figure { kFemale, kMale };
+enum class FigureKind { kFemale, kMale };
 
 // A person by the tape, girths as in ISO 8559-1, m. What is absent follows from the rest.
 struct Measures {
-  Figure figure = Figure::kFemale;
+  FigureKind figure = FigureKind::kFemale;
   std::optional<double> stature{}, bust{}, underbust{}, waist{}, top_hip{}, hip{};
   double arm_angle = 40;  // below the level, degrees
 };

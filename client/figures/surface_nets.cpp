@@ -6,12 +6,12 @@
 namespace weft::client {
 namespace {
 
-using Corner = std::array<int, 3>;
+using NetCorner = std::array<int, 3>;
 
-class Lattice {
+class NetLattice {
  public:
-  Lattice(const std::function<double(const Vector3d&)>& function, const Vector3d& low,
-          const Vector3d& high, double cell)
+  NetLattice(const std::function<double(const Vector3d&)>& function, const Vector3d& low,
+             const Vector3d& high, double cell)
       : low_(low), cell_(cell) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto k = static_cast<Eigen::Index>(axis);
@@ -27,27 +27,27 @@ class Lattice {
 
   FigureMesh surface() {
     vertex_.assign(values_.size(), -1);
-    for_each_cell([&](const Corner& at) { add_vertex(at); });
-    for_each_cell([&](const Corner& at) {
+    for_each_cell([&](const NetCorner& at) { add_vertex(at); });
+    for_each_cell([&](const NetCorner& at) {
       for (std::size_t axis = 0; axis < 3; ++axis) add_quad(at, axis);
     });
     return std::move(mesh_);
   }
 
  private:
-  std::size_t index(const Corner& at) const {
+  std::size_t index(const NetCorner& at) const {
     return static_cast<std::size_t>((at[2] * size_[1] + at[1]) * size_[0] + at[0]);
   }
-  double value(const Corner& at) const { return values_[index(at)]; }
-  bool inside(const Corner& at) const { return value(at) < 0; }
+  double value(const NetCorner& at) const { return values_[index(at)]; }
+  bool inside(const NetCorner& at) const { return value(at) < 0; }
   Vector3d place(const Vector3d& at) const { return low_ + cell_ * at; }
-  static Corner moved(Corner at, std::size_t axis, int by = 1) {
+  static NetCorner moved(NetCorner at, std::size_t axis, int by = 1) {
     at[axis] += by;
     return at;
   }
 
   // Corners that are all far from the surface have one value.
-  void set_block(const std::function<double(const Vector3d&)>& function, const Corner& first) {
+  void set_block(const std::function<double(const Vector3d&)>& function, const NetCorner& first) {
     constexpr double kHalf = (kBlock - 1) / 2.0;
     const double least = 2 * (std::sqrt(3.0) * kHalf + 1) * cell_;
     const double middle =
@@ -63,21 +63,21 @@ class Lattice {
   void for_each_cell(const F& visit) const {
     for (int z = 0; z + 1 < size_[2]; ++z)
       for (int y = 0; y + 1 < size_[1]; ++y)
-        for (int x = 0; x + 1 < size_[0]; ++x) visit(Corner{x, y, z});
+        for (int x = 0; x + 1 < size_[0]; ++x) visit(NetCorner{x, y, z});
   }
 
   // Two sheets that meet in a face of a cell, inside at two corners opposite one another, would
   // share an edge. Whether there were any.
   bool fill_gaps() {
     bool found = false;
-    for_each_cell([&](const Corner& at) {
+    for_each_cell([&](const NetCorner& at) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
-        const Corner one = moved(at, u), other = moved(at, v), across = moved(one, v);
+        const NetCorner one = moved(at, u), other = moved(at, v), across = moved(one, v);
         const bool first = inside(at);
         if (first != inside(across) || first == inside(one) || inside(one) != inside(other))
           continue;
-        const Corner& outside = first ? one : at;
+        const NetCorner& outside = first ? one : at;
         values_[index(outside)] = -0.01 * cell_;
         found = true;
       }
@@ -86,12 +86,12 @@ class Lattice {
   }
 
   // The mean of where the surface crosses the cell's edges.
-  void add_vertex(const Corner& cell) {
+  void add_vertex(const NetCorner& cell) {
     Vector3d sum = Vector3d::Zero();
     int crossings = 0;
     for (std::size_t axis = 0; axis < 3; ++axis)
       for (int k = 0; k < 4; ++k) {
-        const Corner from = moved(moved(cell, (axis + 1) % 3, k & 1), (axis + 2) % 3, k >> 1);
+        const NetCorner from = moved(moved(cell, (axis + 1) % 3, k & 1), (axis + 2) % 3, k >> 1);
         const double a = value(from), b = value(moved(from, axis));
         if ((a < 0) == (b < 0)) continue;
         Vector3d at(from[0], from[1], from[2]);
@@ -105,7 +105,7 @@ class Lattice {
   }
 
   // Around an edge that the surface crosses.
-  void add_quad(const Corner& from, std::size_t axis) {
+  void add_quad(const NetCorner& from, std::size_t axis) {
     const bool leaves = inside(from);
     if (leaves == inside(moved(from, axis))) return;
     const std::size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -135,7 +135,7 @@ class Lattice {
 
 FigureMesh surface_of(const std::function<double(const Vector3d&)>& function, const Vector3d& low,
                       const Vector3d& high, double cell) {
-  return Lattice(function, low, high, cell).surface();
+  return NetLattice(function, low, high, cell).surface();
 }
 
 void smooth(FigureMesh& mesh, int rounds) {

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "client/imports/import.h"
 #include "client/imports/mesh_facts.h"
@@ -18,6 +19,7 @@ using client::import_mesh;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 class MeshScene : public ::testing::Test {
@@ -144,6 +146,21 @@ TEST_F(MeshScene, HasBodiesFromFilesInTheUnitAskedFor) {
   std::memcpy(&first, body.mesh().data().positions_m().data(), sizeof first);
   EXPECT_FLOAT_EQ(first, -0.05F);
   EXPECT_EQ(run_weft({"scene", "check", file}).exit, 0);
+}
+
+TEST_F(MeshScene, IsWornByADressFormOfTheGirthsAskedFor) {
+  const std::string body = directory_.path("body.glb"), file = directory_.path("scene.json");
+  const Outcome made = run_weft({"--json", "body", "new", "--figure", "female", "--stature", "1.72",
+                                 "--bust", "0.96", "--waist", "0.8", "--hip", "1.04", "-o", body});
+  ASSERT_EQ(made.exit, 0) << made.err;
+  const auto answer = nlohmann::json::parse(made.out);
+  EXPECT_NEAR(answer["stature_m"], 1.72, 1e-9);
+  for (const auto& girth : answer["girths"])
+    EXPECT_NEAR(girth["found_m"], girth["wanted_m"], 5e-3) << girth["name"];
+  ASSERT_EQ(run_weft({"scene", "new", "--template", "hang", "--body", body, "-o", file}).exit, 0);
+  const Outcome checked = run_weft({"scene", "check", file});
+  EXPECT_EQ(checked.exit, 0) << checked.err;
+  EXPECT_THAT(checked.out, Not(HasSubstr("BODY_")));
 }
 
 TEST_F(MeshScene, IsWhatACheckOfAMeshLeadsTo) {

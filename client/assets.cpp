@@ -98,35 +98,40 @@ v1::Asset upload_mesh(Connection& connection, const v1::MeshData& mesh) {
 }
 
 v1::Scene upload_meshes(Connection& connection, v1::Scene scene) {
-  for (int i = 0; i < scene.sheets_size(); ++i) {
-    v1::TriangleSheet* triangles = scene.mutable_sheets(i)->has_triangles()
-                                       ? scene.mutable_sheets(i)->mutable_triangles()
-                                       : nullptr;
-    if (triangles == nullptr || triangles->data().ByteSizeLong() <= kMostInline) continue;
+  const auto upload = [&](auto& source, const std::string& field) {
+    if (source.data().ByteSizeLong() <= kMostInline) return;
     try {
-      triangles->set_asset(upload_mesh(connection, triangles->data()).name());
+      source.set_asset(upload_mesh(connection, source.data()).name());
     } catch (Problem& problem) {
       // "data.triangles" of the asset
-      for (auto& violation : problem.violations)
-        violation.field = "sheets[" + std::to_string(i) + "].triangles." + violation.field;
+      for (auto& violation : problem.violations) violation.field = field + violation.field;
       throw;
     }
-  }
+  };
+  for (int i = 0; i < scene.sheets_size(); ++i)
+    if (scene.sheets(i).has_triangles())
+      upload(*scene.mutable_sheets(i)->mutable_triangles(),
+             "sheets[" + std::to_string(i) + "].triangles.");
+  for (int i = 0; i < scene.colliders_size(); ++i)
+    if (scene.colliders(i).has_mesh())
+      upload(*scene.mutable_colliders(i)->mutable_mesh(),
+             "colliders[" + std::to_string(i) + "].mesh.");
   return scene;
 }
 
 Assets assets_of(Connection& connection, const v1::Scene& scene) {
   Assets assets;
-  for (const auto& sheet : scene.sheets()) {
-    const std::string& name = sheet.triangles().asset();
-    if (name.empty() || assets.contains(name)) continue;
+  const auto add = [&](const std::string& name) {
+    if (name.empty() || assets.contains(name)) return;
     try {
       std::string bytes = download_asset(connection, name);
       if (asset_name(bytes) == name) assets.emplace(name, std::move(bytes));
     } catch (const Problem& problem) {  // a server without assets, or another's
       if (problem.code != "NOT_FOUND" && problem.code != "UNIMPLEMENTED") throw;
     }
-  }
+  };
+  for (const auto& sheet : scene.sheets()) add(sheet.triangles().asset());
+  for (const auto& collider : scene.colliders()) add(collider.mesh().asset());
   return assets;
 }
 
@@ -135,6 +140,15 @@ v1::Scene with_meshes(v1::Scene scene, const Assets& assets) {
     const auto asset = assets.find(sheet.triangles().asset());
     if (asset != assets.end())
       sheet.mutable_triangles()->mutable_data()->ParseFromString(asset->second);
+  }
+  return with_bodies(std::move(scene), assets);
+}
+
+v1::Scene with_bodies(v1::Scene scene, const Assets& assets) {
+  for (auto& collider : *scene.mutable_colliders()) {
+    const auto asset = assets.find(collider.mesh().asset());
+    if (asset != assets.end())
+      collider.mutable_mesh()->mutable_data()->ParseFromString(asset->second);
   }
   return scene;
 }

@@ -32,5 +32,7 @@ Assets assets_of(Connection& connection, const v1::Scene& scene);
 
 // The scene with meshes in the place of the assets that are there.
 v1::Scene with_meshes(v1::Scene scene, const Assets& assets);
+// The same of colliders alone.
+v1::Scene with_bodies(v1::Scene scene, const Assets& assets);
 
 }  // namespace weft::client

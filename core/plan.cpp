@@ -5,7 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
+#include "core/contact/contact.h"
 #include "core/model/self_weight.h"
 #include "core/model/text.h"
 #include "core/motion/stability.h"
@@ -296,6 +298,31 @@ void warn_of_damping(const Scene& scene, const std::vector<PlannedSheet>& planne
               kSafeDampingRatio, " would need none of that")});
 }
 
+void warn_of_body(const Scene& scene, std::size_t index, const Body& body, Plan& plan) {
+  const std::string field = join("colliders[", index, "].mesh");
+  for (const std::string& note : body.notes) plan.warnings.push_back({"BODY_MENDED", field, note});
+  constexpr double kFewCells = 2;
+  if (body.thickness < kFewCells * body.grid.cell)
+    plan.warnings.push_back(
+        {"BODY_THIN", field,
+         join("at triangle ", body.thinnest, " it is ", body.thickness,
+              " m thick, less than two of its cells of ", body.grid.cell,
+              " m: so thin a part holds cloth only from its edges, or not at all. Give a smaller "
+              "cell_m")});
+  const Contacts contacts(std::span(&scene.colliders[index], 1), 0, 0, 0, 0);
+  for (const SheetDefinition& sheet : scene.sheets) {
+    const Matrix3Xd x = start_positions(sheet);
+    int inside = 0, first = 0;
+    for (Eigen::Index i = 0; i < x.cols(); ++i)
+      if (contacts.gap(x.col(i)) < 0 && inside++ == 0) first = static_cast<int>(i);
+    if (inside > 0)
+      plan.warnings.push_back(
+          {"STARTS_INSIDE", field,
+           join(inside, " particles of sheet \"", sheet.name, "\" start inside, the first of them ",
+                first, ": they are pushed out at ", Contacts::kOutward, " m/s")});
+  }
+}
+
 void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
           const std::vector<StableStep>& steps, Plan& plan) {
   if (!scene.cloth_contact)
@@ -311,6 +338,9 @@ void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
            "cells between them, and cells that are pulled over an edge may stay hooked on it, "
            "stretched by half for good. A finer grid, a larger skin_m or a capsule along the "
            "edge helps"});
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
+    if (const auto* body = std::get_if<SharedBody>(&scene.colliders[c].shape))
+      warn_of_body(scene, c, **body, plan);
   for (std::size_t s = 0; s < planned.size(); ++s) {
     if (std::holds_alternative<Triangles>(scene.sheets[s].shape)) {
       warn_of_triangles(scene, s, planned[s], steps[s].limiting_particle, plan);

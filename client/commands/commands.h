@@ -14,6 +14,7 @@
 namespace weft::client {
 
 // Each adds one command to the command line; parsing runs it.
+void add_body(CLI::App& app, Context& context);
 void add_scene(CLI::App& app, Context& context);
 void add_session(CLI::App& app, Context& context);
 void add_textile(CLI::App& app, Context& context);

@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <numbers>
 
 #include "client/commands/commands.h"
 #include "client/exports/output_file.h"
+#include "client/imports/mesh_data.h"
 #include "client/imports/mesh_facts.h"
 #include "client/imports/mesh_scene.h"
 #include "client/message_field.h"
@@ -29,6 +31,7 @@ struct MeshOptions {
 struct NewOptions {
   std::string name;
   MeshOptions mesh;
+  std::vector<std::string> bodies;  // files of triangles
   std::string path;
   bool replace = false;
   std::string textile;
@@ -43,11 +46,29 @@ struct NewScene {
   Json json = Json::object();
 };
 
-NewScene from_mesh(MeshOptions options, const TemplateOptions& values) {
+// How files have their positions.
+ImportOptions placed(const MeshOptions& options) {
   const std::map<std::string, double> units{{"m", 1}, {"cm", 0.01}, {"mm", 0.001}};
+  ImportOptions import = options.import;
+  import.unit_m = units.at(options.unit);
+  import.z_up = options.up == "z";
+  return import;
+}
+
+void add_body_file(const std::string& path, const MeshOptions& options, NewScene& made) {
+  const ImportedMesh mesh = import_body(path, placed(options));
+  v1::Collider* body = made.scene.add_colliders();
+  body->set_name(plain_name(std::filesystem::path(path).stem().string(), "body"));
+  *body->mutable_mesh()->mutable_data() = body_data(mesh);
+  made.text += fmt::format("body        {}: {}\n", body->name(),
+                           count_of(static_cast<std::int64_t>(mesh.triangles.size()), "triangle"));
+  for (const std::string& note : mesh.notes) made.text += fmt::format("            {}\n", note);
+  made.json["bodies"].push_back({{"name", body->name()}, {"triangles", mesh.triangles.size()}});
+}
+
+NewScene from_mesh(MeshOptions options, const TemplateOptions& values) {
   const double grain = options.grain_degrees * std::numbers::pi / 180;
-  options.import.unit_m = units.at(options.unit);
-  options.import.z_up = options.up == "z";
+  options.import = placed(options);
   options.import.grain_rad = options.scene.grain_rad = grain;
   options.scene.textile = values.textile;
   options.scene.accuracy = values.accuracy;
@@ -79,6 +100,7 @@ NewScene new_scene(const NewOptions& options) {
 void run_new(Context& context, NewOptions options) {
   if (!options.textile.empty()) options.values.textile = textile_named(options.textile);
   NewScene made = new_scene(options);
+  for (const std::string& body : options.bodies) add_body_file(body, options.mesh, made);
   for (const std::string& field : options.fields) {
     const auto [place, value] = read_setting(field);
     set_field(made.scene, place, value);
@@ -138,7 +160,7 @@ Top is +y and right +x, as seen from the front. What cannot be simulated is
 refused with its place in the file.
   weft scene new --mesh shirt.obj --pin border:top -o shirt.json
   weft scene new --mesh dress.glb --mend --textile jersey_interlock \
-      --panel-textile belt=denim_11oz -o dress.json
+      --panel-textile belt=denim_11oz --body figure.obj -o dress.json
 
 --mend joins points in one place, drops triangles without area, turns those that
 face the other way, and joins the ends of slivers, triangles lower than a
@@ -161,10 +183,10 @@ void add_mesh_options(CLI::App& command, MeshOptions& options) {
                              "m for a unit of UV; else found by comparing lengths"))
       ->type_name("M")
       ->check(CLI::Range(1e-6, 1e6));
-  of_mesh(command.add_option("--unit", options.unit, "Of positions in the mesh; else m"))
+  command.add_option("--unit", options.unit, "Of positions in the mesh and in bodies; else m")
       ->check(CLI::IsMember({"m", "cm", "mm"}))
       ->option_text("m|cm|mm");
-  of_mesh(command.add_option("--up", options.up, "Up in the mesh; else y"))
+  command.add_option("--up", options.up, "Up in the mesh and in bodies; else y")
       ->check(CLI::IsMember({"y", "z"}))
       ->option_text("y|z");
   of_mesh(command.add_option("--grain", options.grain_degrees,
@@ -198,6 +220,12 @@ void add_new(CLI::App& scene, Context& context) {
       scene.add_subcommand("new", "Write a scene file from a template, or from a mesh");
   command->add_option("-t,--template", options->name, "Template to start from")->type_name("NAME");
   add_mesh_options(*command, options->mesh);
+  command
+      ->add_option("--body", options->bodies,
+                   "Closed triangles that particles do not enter: .obj, .gltf or .glb; may be "
+                   "given again")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
   command->add_option("-o,--output", options->path, "Scene file to write; else it goes to stdout")
       ->type_name("FILE");
   command->add_flag("--force", options->replace, "Replace a file that exists");

@@ -178,6 +178,15 @@ Import import_mesh(const std::string& path, const std::string& bytes,
   return import;
 }
 
+ImportedMesh import_body(const std::string& path, const ImportOptions& options) {
+  ImportedMesh mesh = read_mesh(path, read_text(path));
+  place_in_space(mesh, options);
+  join_points(mesh, 0);
+  drop_unused_points(mesh);
+  if (mesh.triangles.empty()) throw malformed(path, "has no triangle");
+  return mesh;
+}
+
 Import import_mesh(const std::string& path, const ImportOptions& options) {
   return import_mesh(path, read_text(path), options);
 }

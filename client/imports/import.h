@@ -28,6 +28,10 @@ Import import_mesh(const std::string& path, const ImportOptions& options);
 // The same from its bytes.
 Import import_mesh(const std::string& path, const std::string& bytes, const ImportOptions& options);
 
+// A body from the same files: all of their triangles, in m, y up. Whether it is closed is for the
+// server to say.
+ImportedMesh import_body(const std::string& path, const ImportOptions& options);
+
 // By its ending: what weft imports.
 bool is_mesh_file(const std::string& path);
 

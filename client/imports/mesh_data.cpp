@@ -34,10 +34,15 @@ std::string indices(const Triangles& triangles) {
 
 }  // namespace
 
-v1::MeshData mesh_data(const ImportedMesh& mesh, double grain_rad) {
+v1::MeshData body_data(const ImportedMesh& mesh) {
   v1::MeshData data;
   data.set_positions_m(planes(mesh.positions));
   data.set_triangles(indices(mesh.triangles));
+  return data;
+}
+
+v1::MeshData mesh_data(const ImportedMesh& mesh, double grain_rad) {
+  v1::MeshData data = body_data(mesh);
   data.set_flat_m(planes(mesh.flat));
   if (mesh.corners != mesh.triangles) data.set_flat_triangles(indices(mesh.corners));
   for (std::size_t p = 0; p < mesh.panels.size(); ++p) {

@@ -63,6 +63,21 @@ function dots(size) {
     {size, sizeAttenuation: false, map: new THREE.CanvasTexture(canvas), alphaTest: 0.5});
 }
 
+// A body of triangles; each has its own corners, so that edges stay sharp where its neighbours turn away.
+function solidGeometry(data) {
+  const planes = new Float32Array(bytesOf(data.positions_m).buffer);
+  const triangles = new Uint32Array(bytesOf(data.triangles).buffer);
+  const count = planes.length / 3;
+  const corners = new Float32Array(3 * triangles.length);
+  triangles.forEach((vertex, i) => {
+    for (let axis = 0; axis < 3; ++axis) corners[3 * i + axis] = planes[axis * count + vertex];
+  });
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.BufferAttribute(corners, 3));
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
 // The shape of a collider as a mesh where it starts; a plane is shown as far as `reach`.
 function colliderMesh(collider, material, centre, reach) {
   const add = (group, geometry, at) => {
@@ -93,6 +108,8 @@ function colliderMesh(collider, material, centre, reach) {
         start.clone().lerp(end, 0.5));
       side.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis.normalize());
     }
+  } else if (collider.mesh?.data) {
+    add(group, solidGeometry(collider.mesh.data), new THREE.Vector3());
   } else if (collider.plane) {
     const {normal, point} = surfaceOf(collider.plane, centre);
     const disc = add(group, new THREE.CircleBufferGeometry(reach, 96), point);

@@ -9,6 +9,7 @@
 #include <limits>
 #include <string_view>
 
+#include "client/assets.h"
 #include "client/exports/output_file.h"
 #include "client/output/json.h"
 #include "client/page/facts.h"
@@ -173,6 +174,7 @@ struct Source {
         range(frames_of(recording, wanted)),
         summary(summary_of(recording, range)),
         cloth(cloth_of(recording)),
+        colliders(colliders_json(with_bodies(recording.scene(), recording.assets()))),
         quantum_m(quantum_of(cloth, summary)) {}
 
   std::string name;
@@ -181,6 +183,7 @@ struct Source {
   FrameRange range;
   Summary summary;
   std::vector<ClothMesh> cloth;
+  Json colliders;
   double quantum_m;
 };
 
@@ -202,7 +205,7 @@ Json recording_json(const Source& source) {
           {"high_m", summary.high},
           {"stats", recording.header().format().stats() ? stats_json(summary.stats) : Json()},
           {"sheets", sheets_json(recording, source.cloth)},
-          {"colliders", colliders_json(recording.scene())},
+          {"colliders", source.colliders},
           {"gravity_m_per_s2",
            to_json(recording.scene().environment().gravity_m_per_s2(), Defaults::kLeftOut)},
           {"facts", std::move(facts)}};

@@ -109,7 +109,8 @@ std::vector<std::pair<std::int64_t, double>> RecordingReader::find_around(double
 
 Assets RecordingReader::assets() {
   Assets assets;
-  if (!needs_topology(header_)) return assets;
+  // sheets of triangles have it, and bodies
+  if (!database_.prepare("SELECT 1 FROM sqlite_master WHERE name = 'assets'").step()) return assets;
   Statement row = database_.prepare("SELECT name, data FROM assets");
   while (row.step()) {
     const std::string data = row.bytes(1);

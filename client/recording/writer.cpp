@@ -68,7 +68,8 @@ void describe(Database& database, const v1::Scene& scene, const v1::StreamHeader
       .bind(1, none)
       .bind(2, checksum_of_frame(header.uid(), none))
       .step();
-  if (needs_topology(header)) write_triangles(database, header.uid(), topology, assets);
+  if (needs_topology(header) || !assets.empty())
+    write_triangles(database, header.uid(), topology, assets);
   database.execute("COMMIT");
 }
 

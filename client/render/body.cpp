@@ -1,7 +1,10 @@
 #include "client/render/body.h"
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
+
+#include "client/exports/normals.h"
 
 namespace weft::client {
 namespace {
@@ -26,6 +29,28 @@ Vector3d direction_of(const Vector3d& vector, const Vector3d& otherwise) {
   return length > 0 ? Vector3d(vector / length) : otherwise;
 }
 
+Solid solid_of(const v1::MeshData& mesh, const Vector3d& offset) {
+  Solid solid;
+  solid.offset = offset;
+  const std::size_t count = mesh.positions_m().size() / (3 * sizeof(float));
+  std::vector<float> planes(3 * count);
+  std::memcpy(planes.data(), mesh.positions_m().data(), planes.size() * sizeof(float));
+  const auto plane = [&](std::size_t axis) {
+    const auto first = planes.begin() + static_cast<std::ptrdiff_t>(axis * count);
+    return std::vector<double>(first, first + static_cast<std::ptrdiff_t>(count));
+  };
+  solid.corners = {plane(0), plane(1), plane(2)};
+  solid.triangles.resize(mesh.triangles().size() / sizeof(std::uint32_t));
+  std::memcpy(solid.triangles.data(), mesh.triangles().data(),
+              solid.triangles.size() * sizeof(std::uint32_t));
+  if (std::any_of(solid.triangles.begin(), solid.triangles.end(),
+                  [&](std::uint32_t i) { return i >= count; }))
+    solid.triangles.clear();
+  solid.triangles.resize(solid.triangles.size() / 3 * 3);
+  solid.normals = normals_of(solid.corners, solid.triangles);
+  return solid;
+}
+
 Body body_of(const v1::Collider& collider, const Vector3d& offset) {
   switch (collider.shape_case()) {
     case v1::Collider::kSphere:
@@ -44,6 +69,8 @@ Body body_of(const v1::Collider& collider, const Vector3d& offset) {
       }
       return Cuboid{vector_of(box.center_m()) + offset, vector_of(box.half_size_m()), rotation};
     }
+    case v1::Collider::kMesh:
+      return solid_of(collider.mesh().data(), offset);
     default: {
       const v1::Plane& plane = collider.plane();
       return HalfSpace{vector_of(plane.point_m()) + offset,
@@ -88,6 +115,10 @@ Way way_from(const Cuboid& box, const Vector3d& place, double rounding) {
   return {-depth, box.rotation * direction};
 }
 
+Way way_from(const Solid& /*solid*/, const Vector3d& /*place*/, double /*rounding*/) {
+  return {std::numeric_limits<double>::infinity(), Vector3d::UnitY()};
+}
+
 Way way_from(const HalfSpace& space, const Vector3d& place, double /*rounding*/) {
   return {(place - space.point).dot(space.normal), space.normal};
 }
@@ -112,6 +143,11 @@ std::vector<Ball> hull_of(const Body& body) {
   if (const auto* capsule = std::get_if<Capsule>(&body))
     return {{capsule->start, capsule->radius}, {capsule->end, capsule->radius}};
   std::vector<Ball> corners;
+  if (const auto* solid = std::get_if<Solid>(&body)) {
+    const Points& at = solid->corners;
+    for (std::size_t i = 0; i < at.x.size(); ++i)
+      corners.push_back({Vector3d(at.x[i], at.y[i], at.z[i]) + solid->offset, 0});
+  }
   if (const auto* box = std::get_if<Cuboid>(&body)) {
     for (int k = 0; k < 8; ++k) {
       const Vector3d signs(k & 1 ? 1 : -1, k & 2 ? 1 : -1, k & 4 ? 1 : -1);

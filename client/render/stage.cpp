@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "client/assets.h"
 #include "client/problem.h"
 #include "client/recording/cloth.h"
 #include "client/render/lattice.h"
@@ -65,7 +66,7 @@ Stage read_stage(RecordingReader& recording, std::int64_t number, Colouring colo
   Stage stage;
   stage.frame = number;
   stage.time_s = frame.time_s();
-  stage.bodies = bodies_at(recording.scene(), stage.time_s);
+  stage.bodies = bodies_at(with_bodies(recording.scene(), recording.assets()), stage.time_s);
   const int pieces = pieces_of(header);
   const std::vector<ClothMesh> meshes = cloth_of(recording);
   int panels = 0;

@@ -188,9 +188,11 @@ class Tracer::Rays {
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return background(direction);
     if (ray.hit.geomID < stage_.surfaces.size())
       return cloth_colour(ray.hit, place, direction, sample);
-    const std::size_t body = solids_[ray.hit.geomID - stage_.surfaces.size()];
+    const Body& body = stage_.bodies[solids_[ray.hit.geomID - stage_.surfaces.size()]];
+    if (const auto* solid = std::get_if<Solid>(&body))
+      return solid_colour(*solid, ray.hit, place, direction, sample);
     const Vector3f normal =
-        way_out(stage_.bodies[body], place.cast<double>() + studio_.centre).direction.cast<float>();
+        way_out(body, place.cast<double>() + studio_.centre).direction.cast<float>();
     return kBody * light(place, normal, normal, 0, sample);
   }
 
@@ -265,6 +267,10 @@ class Tracer::Rays {
     const std::vector<Ball> hull = hull_of(body);
     std::vector<Vector3f> corners;
     for (const Ball& ball : hull) corners.push_back(local(ball.centre));
+    if (const auto* solid = std::get_if<Solid>(&body)) {
+      add_triangles(corners, solid->triangles);
+      return;
+    }
     if (std::holds_alternative<Cuboid>(body)) {
       // the sides where x, y, z are least, and where they are most
       add_triangles(corners, {0, 2, 6, 0, 6, 4, 0, 1, 5, 0, 5, 4, 0, 1, 3, 0, 3, 2,
@@ -361,6 +367,30 @@ class Tracer::Rays {
     const float glance = 1 - std::abs(normal.dot(direction));
     const float fuzz = 0.10F * glance * glance * glance;
     return mix(tint, Colour::Ones(), fuzz) * light(place, face, normal, kThrough, sample);
+  }
+
+  // Smooth, but for edges that turn by more than 40 degrees.
+  Colour solid_colour(const Solid& solid, const RTCHit& hit, const Vector3f& place,
+                      const Vector3f& direction, Sample& sample) const {
+    constexpr float kSmooth = 0.77F;
+    const std::uint32_t* triangle = &solid.triangles[3 * std::size_t{hit.primID}];
+    const auto corner = [&](std::size_t k) {
+      const Points& at = solid.corners;
+      return Eigen::Vector3d(at.x[triangle[k]], at.y[triangle[k]], at.z[triangle[k]]);
+    };
+    Vector3f face = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized().cast<float>();
+    const std::array weights{1 - hit.u - hit.v, hit.u, hit.v};
+    Vector3f normal = Vector3f::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vector3f at(solid.normals[triangle[k]].data());
+      normal += weights[k] * (at.dot(face) > kSmooth ? at : face);
+    }
+    normal.normalize();
+    if (face.dot(direction) > 0) {
+      face = -face;
+      normal = -normal;
+    }
+    return kBody * light(place, face, normal, 0, sample);
   }
 
   Colour ground_colour(const Plane& plane, const Vector3f& place, const Vector3f& direction,

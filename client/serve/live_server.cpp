@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "client/assets.h"
 #include "client/commands/commands.h"
 #include "client/frame_parts.h"
 #include "client/page/page.h"
@@ -46,13 +47,17 @@ Json list_all(Connection& connection, const std::string&) {
   return to_json(all);
 }
 
-// A session, without its start: frames show where it is.
+// A session, without its start: frames show where it is. Bodies have their triangles.
 Json get(Connection& connection, const std::string& json) {
   v1::Session session = connection.get_session(read_message<v1::GetSessionRequest>(json).name());
   for (v1::Sheet& sheet : *session.mutable_scene()->mutable_sheets()) {
     sheet.clear_start_positions_m();
     sheet.clear_start_velocities_m_per_s();
   }
+  v1::Scene bodies;
+  *bodies.mutable_colliders() = session.scene().colliders();
+  const Assets assets = assets_of(connection, bodies);
+  *session.mutable_scene() = with_bodies(session.scene(), assets);
   return to_json(session);
 }
 

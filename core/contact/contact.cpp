@@ -26,6 +26,8 @@ double thickness(const Plane&) { return kInfinite; }
 double thickness(const Sphere& sphere) { return 2 * sphere.radius; }
 double thickness(const Box& box) { return 2 * box.half_size.minCoeff(); }
 double thickness(const Capsule& capsule) { return 2 * capsule.radius; }
+// What is thinner than a cell is not in the grid.
+double thickness(const SharedBody& body) { return std::max(body->thickness, body->grid.cell); }
 
 }  // namespace
 
@@ -59,6 +61,51 @@ Distance distance(const Capsule& capsule, const Vector3d& point) {
   return distance_from_ball(capsule.start + along * axis, capsule.radius, point);
 }
 
+Distance distance(const SharedBody& body, const Vector3d& point) {
+  const DistanceGrid& grid = body->grid;
+  constexpr int kBlock = DistanceGrid::kBlock;
+  const double edge = kBlock * grid.cell;
+
+  // the block, and where in it
+  const Vector3d most(grid.blocks[0], grid.blocks[1], grid.blocks[2]);
+  const Vector3d at = (point - grid.low) * (1 / edge);
+  const Vector3d inside =
+      at.binaryExpr(most, [](double v, double end) { return v > 0 ? std::min(v, end) : 0; });
+  const Vector3d block = inside.array().floor().min(most.array() - 1);
+  const auto index =
+      static_cast<std::size_t>((block.z() * most.y() + block.y()) * most.x() + block.x());
+  const std::int32_t begin = grid.begin[index];
+  const int cells = begin < 0 ? 1 : kBlock;
+  const Vector3d in_block = (inside - block) * cells;
+  const Vector3d cell = in_block.array().floor().min(cells - 1);
+  const Vector3d share = in_block - cell;
+
+  // values at the corners of the cell, and between them
+  const int row = cells + 1, layer = row * row;
+  const float* const first = grid.values.data() + (begin < 0 ? ~begin : begin) +
+                             static_cast<int>(cell.z()) * layer + static_cast<int>(cell.y()) * row +
+                             static_cast<int>(cell.x());
+  const auto between = [](double a, double b, double s) { return a + (b - a) * s; };
+  double x[2][2], dx[2][2], y[2], dxy[2], dy[2];
+  for (int k = 0; k < 2; ++k) {
+    for (int j = 0; j < 2; ++j) {
+      const float* const v = first + k * layer + j * row;
+      dx[k][j] = double{v[1]} - double{v[0]};
+      x[k][j] = double{v[0]} + dx[k][j] * share.x();
+    }
+    dy[k] = x[k][1] - x[k][0];
+    y[k] = x[k][0] + dy[k] * share.y();
+    dxy[k] = between(dx[k][0], dx[k][1], share.y());
+  }
+  const double value = between(y[0], y[1], share.z());
+  const Vector3d gradient(between(dxy[0], dxy[1], share.z()), between(dy[0], dy[1], share.z()),
+                          y[1] - y[0]);
+  const double length = gradient.norm();
+  const Vector3d normal = length > 0 ? Vector3d(gradient / length) : Vector3d(Vector3d::UnitY());
+  const double beyond = (at - inside).norm() * edge;
+  return {beyond > 0 ? grid.reach + beyond : value, normal};
+}
+
 Distance distance(const Collider& collider, const Vector3d& point, double time) {
   return distance_at(collider, offset_at(collider.path, time), point);
 }
@@ -71,13 +118,14 @@ Contacts::Contacts(std::span<const Collider> colliders, double friction, double 
     const Vector3d offset = offset_at(collider.path, time);
     const Vector3d carried = offset - offset_at(collider.path, time - dt);
     const auto* box = std::get_if<Box>(&collider.shape);
+    const bool of_triangles = std::holds_alternative<SharedBody>(collider.shape);
     placed_.push_back(
         {collider,
          box != nullptr ? box->rotation.normalized().toRotationMatrix()
                         : Eigen::Matrix3d::Identity().eval(),
          offset, carried, std::sqrt(friction * collider.friction),
-         std::visit([](const auto& shape) { return thickness(shape); }, collider.shape) +
-             2 * skin});
+         std::visit([](const auto& shape) { return thickness(shape); }, collider.shape) + 2 * skin,
+         of_triangles ? DistanceGrid::kSteepest : 1, of_triangles ? kOutward * dt : kInfinite});
     reach_ = std::max(reach_, carried.norm());
     thinnest_ = std::min(thinnest_, placed_.back().thickness);
   }
@@ -86,7 +134,8 @@ Contacts::Contacts(std::span<const Collider> colliders, double friction, double 
 double Contacts::gap(const Vector3d& x) const {
   double least = kInfinite;
   for (const Placed& each : placed_)
-    least = std::min(least, distance_at(each.collider, each.offset, x).value - skin_);
+    least =
+        std::min(least, (distance_at(each.collider, each.offset, x).value - skin_) / each.steepest);
   return least;
 }
 
@@ -97,7 +146,8 @@ int Contacts::parts(const Vector3d& x, const Vector3d& d) const {
   for (const Placed& each : placed_) {
     const double relative = (d - each.carried).norm();
     const double needed = kParts * relative / each.thickness;
-    if (needed > most && distance_at(each.collider, each.offset, x).value - skin_ < relative)
+    if (needed > most &&
+        distance_at(each.collider, each.offset, x).value - skin_ < each.steepest * relative)
       most = needed;
   }
   return static_cast<int>(std::ceil(std::min(most, kMost)));
@@ -120,6 +170,7 @@ bool Contacts::resolve(Vector3d& x, Vector3d& d) const {
 
 bool Contacts::push_out(Vector3d& x, Vector3d& d, double left, double share) const {
   bool touched = false;
+  double pushed = 0;
   for (int round = 0; round < kRounds; ++round) {
     double deepest = 0;
     for (const Placed& each : placed_) {
@@ -127,10 +178,12 @@ bool Contacts::push_out(Vector3d& x, Vector3d& d, double left, double share) con
       const auto [value, normal] = distance_at(each.collider, offset, x);
       if (!(value < skin_)) continue;
       touched = true;
-      const double depth = skin_ - value;
-      deepest = std::max(deepest, depth);
       const Vector3d relative = d - share * each.carried;
       const double approach = relative.dot(normal);
+      const double most = std::max(-approach, 0.0) + pushed + share * each.creep;
+      const double depth = std::min(skin_ - value, most);
+      pushed += depth;
+      deepest = std::max(deepest, depth);
 
       // out to the skin; the push takes away approach but never adds speed
       x += depth * normal;

@@ -18,6 +18,9 @@ Distance distance(const Plane& plane, const Vector3d& point);
 Distance distance(const Sphere& sphere, const Vector3d& point);
 Distance distance(const Box& box, const Vector3d& point);
 Distance distance(const Capsule& capsule, const Vector3d& point);
+// Of a body of triangles as its grid has it; farther outside than its reach it is nearer than the
+// body, and the direction of no meaning.
+Distance distance(const SharedBody& body, const Vector3d& point);
 Distance distance(const Collider& collider, const Vector3d& point, double time);
 
 // The colliders of a scene during one step, as a sheet meets them.
@@ -35,6 +38,8 @@ class Contacts {
     Vector3d carried;      // its displacement in the step, m
     double friction;       // between it and the textile
     double thickness;      // of it where it is thinnest, with the skin on both sides, m
+    double steepest;       // by how much its distances grow in a metre, at most
+    double creep;          // how far what began in it is pushed out in the step, m
   };
   std::span<const Placed> placed() const { return placed_; }
   double skin() const { return skin_; }
@@ -42,16 +47,18 @@ class Contacts {
   // more than kNothing (m).
   static constexpr int kRounds = 32;
   static constexpr double kNothing = 1e-12;
+  static constexpr double kOutward = 0.25;  // m/s, see resolve()
   // How far the fastest collider moves in this step, m.
   double reach() const { return reach_; }
   // Whether a particle that moves so far (m) in this step could come through a collider unseen.
   bool may_cross(double moved) const { return kParts * (moved + reach_) > thinnest_; }
-  // How far a point is from the nearest skin at the end of the step, m; negative inside.
+  // How far a point is from the nearest skin at the end of the step, m, or less; negative inside.
   double gap(const Vector3d& x) const;
   // Moves a particle that is closer to a collider than the skin out to it, inelastically, and slows
   // its sliding by Coulomb friction. Where it could have crossed one in the step, it meets them in
-  // parts of the step, in each of which it comes no farther than a quarter of the thickness. x:
-  // position, d: displacement of the last step, m. Whether it touched one.
+  // parts of the step, in each of which it comes no farther than a quarter of the thickness. What
+  // is deeper in a body of triangles than it can have come in the step began there: it leaves at
+  // kOutward. x: position, d: displacement of the last step, m. Whether it touched one.
   bool resolve(Vector3d& x, Vector3d& d) const;
 
  private:

@@ -8,6 +8,9 @@
 
 #include <hwy/highway.h>
 
+#include <cstdint>
+#include <limits>
+
 #include "core/contact/contact.h"
 #include "core/motion/vectors-inl.h"
 
@@ -88,38 +91,140 @@ HWY_INLINE Distances distances(const Box& box, const Eigen::Matrix3d& turn, cons
   return {hn::IfThenElse(apart, length, inside), normal};
 }
 
+// The distance of the plain version, which says more of it.
+HWY_INLINE Distances distances(const SharedBody& body, const Eigen::Matrix3d&,
+                               const Places& point) {
+  const ContactTag tag;
+  const hn::Rebind<std::int32_t, ContactTag> ints;
+  const hn::Rebind<float, ContactTag> floats;
+  const hn::Rebind<std::uint32_t, ContactTag> words;
+  const hn::RebindToSigned<ContactTag> offsets;
+  const hn::RebindToUnsigned<ContactTag> pairs;
+  const DistanceGrid& grid = body->grid;
+  constexpr double kBlock = DistanceGrid::kBlock;
+  const double edge = kBlock * grid.cell;
+  const Reals zero = real(0), one = real(1);
+  const Places most{real(grid.blocks[0]), real(grid.blocks[1]), real(grid.blocks[2])};
+
+  // the block, and where in it
+  const Places at = times(minus(point, everywhere(grid.low)), real(1 / edge));
+  const auto within = [&](Reals v, Reals end) HWY_ATTR {
+    return hn::IfThenElseZero(hn::Gt(v, zero), hn::Min(v, end));  // also what is no number
+  };
+  const Places inside{within(at.x, most.x), within(at.y, most.y), within(at.z, most.z)};
+  const auto whole = [&](Reals v, Reals end)
+                         HWY_ATTR { return hn::Min(hn::Floor(v), hn::Sub(end, one)); };
+  const Places block{whole(inside.x, most.x), whole(inside.y, most.y), whole(inside.z, most.z)};
+  const Reals index = hn::MulAdd(hn::MulAdd(block.z, most.y, block.y), most.x, block.x);
+  const Reals begin =
+      hn::PromoteTo(tag, hn::GatherIndex(ints, grid.begin.data(), hn::DemoteTo(ints, index)));
+  const auto fine = hn::Ge(begin, zero);
+  const Reals cells = hn::IfThenElse(fine, real(kBlock), one);
+  const Places in_block = times(minus(inside, block), cells);
+  const Places cell{whole(in_block.x, cells), whole(in_block.y, cells), whole(in_block.z, cells)};
+  const Places share = minus(in_block, cell);
+
+  // values at the corners of the cell, and between them
+  const Reals row = hn::Add(cells, one), layer = hn::Mul(row, row);
+  const Reals first = hn::Add(hn::IfThenElse(fine, begin, hn::Sub(hn::Neg(one), begin)),
+                              hn::MulAdd(cell.z, layer, hn::MulAdd(cell.y, row, cell.x)));
+  const auto between = [](Reals a, Reals b, Reals s)
+                           HWY_ATTR { return hn::MulAdd(hn::Sub(b, a), s, a); };
+  struct Line {
+    Reals value, slope;
+  };
+  const auto along_x = [&](Reals from) HWY_ATTR {
+    // two neighbours at a time
+    const auto bytes = hn::ShiftLeft<2>(hn::PromoteTo(offsets, hn::DemoteTo(ints, from)));
+    const auto pair =
+        hn::GatherOffset(pairs, reinterpret_cast<const std::uint64_t*>(grid.values.data()), bytes);
+    const auto read = [&](auto v) HWY_ATTR {
+      return hn::PromoteTo(tag, hn::BitCast(floats, hn::TruncateTo(words, v)));
+    };
+    const Reals a = read(pair), b = read(hn::ShiftRight<32>(pair));
+    const Reals slope = hn::Sub(b, a);
+    return Line{hn::MulAdd(slope, share.x, a), slope};
+  };
+  struct Face {
+    Reals value, x, y;
+  };
+  const auto across_y = [&](Reals from) HWY_ATTR {
+    const Line low = along_x(from), high = along_x(hn::Add(from, row));
+    const Reals slope = hn::Sub(high.value, low.value);
+    return Face{hn::MulAdd(slope, share.y, low.value), between(low.slope, high.slope, share.y),
+                slope};
+  };
+  const Face low = across_y(first), high = across_y(hn::Add(first, layer));
+  const Places gradient{between(low.x, high.x, share.z), between(low.y, high.y, share.z),
+                        hn::Sub(high.value, low.value)};
+  const Reals length = hn::Sqrt(squared(gradient));
+  const auto sloped = hn::Gt(length, zero);
+  const Places normal = times(gradient, hn::Div(one, length));
+  const Places away = minus(at, inside);
+  const Reals beyond = hn::Mul(hn::Sqrt(squared(away)), real(edge));
+  return {hn::IfThenElse(hn::Gt(beyond, zero), hn::Add(real(grid.reach), beyond),
+                         between(low.value, high.value, share.z)),
+          {hn::IfThenElseZero(sloped, normal.x), hn::IfThenElse(sloped, normal.y, one),
+           hn::IfThenElseZero(sloped, normal.z)}};
+}
+
 HWY_INLINE Distances distances(const Contacts::Placed& placed, const Places& point) {
   const Places at = minus(point, everywhere(placed.offset));
   const auto& shape = placed.collider.shape;
   if (const auto* plane = std::get_if<Plane>(&shape)) return distances(*plane, placed.turn, at);
   if (const auto* sphere = std::get_if<Sphere>(&shape)) return distances(*sphere, placed.turn, at);
   if (const auto* box = std::get_if<Box>(&shape)) return distances(*box, placed.turn, at);
+  if (const auto* body = std::get_if<SharedBody>(&shape)) return distances(*body, placed.turn, at);
   return distances(*std::get_if<Capsule>(&shape), placed.turn, at);
 }
 
-// See Contacts::resolve().
+// See Contacts::gap(); and the distances from the first collider. Precondition: there is one.
+struct Gaps {
+  Reals least;
+  Distances first;
+};
+HWY_INLINE Gaps gaps(const Contacts& contacts, const Places& x) {
+  const auto gap = [&](const Contacts::Placed& placed, Reals value) HWY_ATTR {
+    const Reals beyond = hn::Sub(value, real(contacts.skin()));
+    return placed.steepest == 1 ? beyond : hn::Div(beyond, real(placed.steepest));
+  };
+  const auto placed = contacts.placed();
+  const Distances first = distances(placed[0], x);
+  Reals least = gap(placed[0], first.value);
+  for (const Contacts::Placed& each : placed.subspan(1))
+    least = hn::Min(least, gap(each, distances(each, x).value));
+  return {least, first};
+}
+
+// See Contacts::resolve(). first: distances of x from the first collider.
 template <class M>
-HWY_INLINE void resolve_places(const Contacts& contacts, M active, Places& x, Places& d) {
+HWY_INLINE void resolve_places(const Contacts& contacts, M active, const Distances& first,
+                               Places& x, Places& d) {
   const Reals zero = real(0), skin = real(contacts.skin());
+  Reals pushed = zero;
   for (int round = 0; round < Contacts::kRounds; ++round) {
     Reals deepest = zero;
     for (const Contacts::Placed& placed : contacts.placed()) {
-      const auto [value, normal] = distances(placed, x);
+      const bool known = round == 0 && &placed == contacts.placed().data();
+      const auto [value, normal] = known ? first : distances(placed, x);
       const auto touching = hn::And(active, hn::Lt(value, skin));
-      const Reals depth = hn::IfThenElseZero(touching, hn::Sub(skin, value));
-      deepest = hn::Max(deepest, depth);
       const Places relative = minus(d, everywhere(placed.carried));
       const Reals approach = dot(relative, normal);
+      const Reals come = hn::Max(hn::Neg(approach), zero);
+      const Reals most = hn::Add(hn::Add(come, pushed), real(placed.creep));
+      const Reals depth = hn::IfThenElseZero(touching, hn::Min(hn::Sub(skin, value), most));
+      pushed = hn::Add(pushed, depth);
+      deepest = hn::Max(deepest, depth);
 
       x = plus_times(x, normal, depth);
-      const Reals push = hn::Min(hn::Max(hn::Neg(approach), zero), depth);
+      const Reals push = hn::Min(come, depth);
       d = plus_times(d, normal, push);
 
       const Places sliding = minus_times(relative, normal, approach);
       const Reals length = hn::Sqrt(squared(sliding));
-      const Reals most = hn::Div(hn::Mul(real(placed.friction), push), length);
+      const Reals stopped = hn::Div(hn::Mul(real(placed.friction), push), length);
       const Reals share =
-          hn::IfThenElseZero(hn::And(touching, hn::Gt(length, zero)), hn::Min(real(1), most));
+          hn::IfThenElseZero(hn::And(touching, hn::Gt(length, zero)), hn::Min(real(1), stopped));
       x = minus_times(x, sliding, share);
       d = minus_times(d, sliding, share);
     }

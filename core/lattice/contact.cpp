@@ -47,7 +47,7 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
   constexpr int kLanes = LatticeLayout<T>::kLanes;
   const int step = static_cast<int>(hn::Lanes(ContactTag()));
   const Places from = everywhere(origin);
-  const Reals skin = real(contacts.skin()), far = real(std::numeric_limits<double>::infinity());
+  const Reals far = real(std::numeric_limits<double>::infinity());
   Reals nearest = far;
   for (int j = 0; j < state.vectors(); ++j) {
     for (int part = 0; part < kLanes; part += step) {
@@ -66,17 +66,15 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
 
       const auto free = hn::Gt(Of::load(at(State::kStep2)), real(0));
       Places x = plus(from, exact(State::kX, State::kXError));
-      Reals gap = far;
-      for (const Contacts::Placed& placed : contacts.placed())
-        gap = hn::Min(gap, hn::Sub(distances(placed, x).value, skin));
-      gap = hn::IfThenElse(free, gap, far);
+      const Gaps found = gaps(contacts, x);
+      const Reals gap = hn::IfThenElse(free, found.least, far);
       nearest = hn::Min(nearest, gap);
       const auto touching = hn::Lt(gap, real(0));
       if (hn::AllFalse(ContactTag(), touching)) continue;
 
       const Places before = exact(State::kD, State::kDError);
       Places d = before;
-      resolve_places(contacts, touching, x, d);
+      resolve_places(contacts, touching, found.first, x, d);
 
       const auto store = [&](int plane, Reals v) HWY_ATTR {
         Of::store(hn::IfThenElse(touching, v, Of::load(at(plane))), at(plane));

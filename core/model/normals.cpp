@@ -7,10 +7,10 @@ namespace weft {
 namespace {
 
 using ConstPlanes = Eigen::Map<const Eigen::MatrixX3d>;
-using PositionPlanes = Eigen::Map<Eigen::MatrixX3d>;
+using NormalPlanes = Eigen::Map<Eigen::MatrixX3d>;
 
 void set_normals(const Grid& sheet, const ConstPlanes& x, Eigen::Index first,
-                 PositionPlanes& normals) {
+                 NormalPlanes& normals) {
   const auto index = [&](int row, int column) {
     return first + Eigen::Index{row} * sheet.columns + column;
   };
@@ -27,7 +27,7 @@ void set_normals(const Grid& sheet, const ConstPlanes& x, Eigen::Index first,
 
 // Weighted by area, as cross products are.
 void set_normals(const Triangles& sheet, const ConstPlanes& x, Eigen::Index first,
-                 PositionPlanes& normals) {
+                 NormalPlanes& normals) {
   const auto particles = static_cast<Eigen::Index>(sheet->start.size());
   normals.middleRows(first, particles).setZero();
   for (const auto& [a, b, c] : sheet->triangles) {
@@ -46,7 +46,7 @@ std::vector<double> normals_of(const std::vector<double>& positions,
   const auto particles = static_cast<Eigen::Index>(positions.size() / 3);
   const ConstPlanes x(positions.data(), particles, 3);
   std::vector<double> values(positions.size());
-  PositionPlanes normals(values.data(), particles, 3);
+  NormalPlanes normals(values.data(), particles, 3);
   Eigen::Index first = 0;
   for (const SheetShape& sheet : sheets) {
     std::visit([&](const auto& shape) { set_normals(shape, x, first, normals); }, sheet);

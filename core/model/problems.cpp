@@ -250,6 +250,22 @@ void check_shape(const Capsule& capsule, const std::string& field, Check& check)
   check.number(field + ".capsule.radius_m", capsule.radius, kSmallest, kLargest, "m");
 }
 
+void check_shape(const SharedBody& body, const std::string& field, Check& check) {
+  if (!body) check.problem(field + ".mesh", "is absent; give triangles");
+}
+
+// Nearer to a body than its grid reaches, distances are only bounds.
+void check_reach(const Scene& scene, const Collider& collider, const std::string& field,
+                 Check& check) {
+  const auto* body = std::get_if<SharedBody>(&collider.shape);
+  if (body == nullptr || !*body) return;
+  for (const SheetDefinition& sheet : scene.sheets)
+    if (const double skin = sheet.skin_or_default(); skin > (*body)->grid.reach)
+      check.problem(field + ".mesh", "keeps distances up to " + text((*body)->grid.reach) +
+                                         " m; sheet \"" + sheet.name + "\" has a skin_m of " +
+                                         text(skin) + " m");
+}
+
 void check_environment(const Environment& environment, Check& check) {
   check.vector("environment.gravity_m_per_s2", environment.gravity, 1000, "m/s^2");
   if (!environment.wind) return;
@@ -290,6 +306,7 @@ std::vector<Problem> find_problems(const Scene& scene) {
     const std::string field = at("colliders", c);
     check.name(field + ".name", collider.name, collider_names);
     std::visit([&](const auto& shape) { check_shape(shape, field, check); }, collider.shape);
+    check_reach(scene, collider, field, check);
     check.number(field + ".friction_coefficient", collider.friction, 0, 10, "");
     check.path(field + ".path", collider.path);
     check.speed(field + ".path", collider.path);

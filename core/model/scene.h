@@ -2,11 +2,13 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "core/model/body.h"
 #include "core/model/shape.h"
 #include "core/model/textile.h"
 
@@ -100,11 +102,15 @@ struct Capsule {
   double radius = 0;                  // m
 };
 
+using SharedBody = std::shared_ptr<const Body>;
+
 struct Collider {
   std::string name;
-  std::variant<Plane, Sphere, Box, Capsule> shape;
+  std::variant<Plane, Sphere, Box, Capsule, SharedBody> shape;
   double friction = 0.3;
   Path path;
+  std::string asset = {};        // name of what holds the mesh of its body; empty: it has none
+  std::optional<double> cell{};  // of its body's grid as asked for, m
 };
 
 struct Wind {

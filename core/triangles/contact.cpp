@@ -34,7 +34,7 @@ template <class T>
 double resolve_block_as(const Contacts& contacts, const Vector3d& origin, bool compensated,
                         int block, TriangleState<T>& state) {
   const ContactTag d;
-  const Reals skin = real(contacts.skin()), far = real(std::numeric_limits<double>::infinity());
+  const Reals far = real(std::numeric_limits<double>::infinity());
   constexpr std::size_t kBlock = TriangleLaw<T>::kBlock, kValues = 4;
   const std::size_t begin = static_cast<std::size_t>(block) * kBlock * kValues;
   Reals nearest = far;
@@ -55,17 +55,15 @@ double resolve_block_as(const Contacts& contacts, const Vector3d& origin, bool c
 
     const auto free = hn::Gt(hn::Load(d, mobile), real(0));
     Places x = plus(everywhere(origin), exact(state.x, state.x_error));
-    Reals gap = far;
-    for (const Contacts::Placed& placed : contacts.placed())
-      gap = hn::Min(gap, hn::Sub(distances(placed, x).value, skin));
-    gap = hn::IfThenElse(free, gap, far);
+    const Gaps found = gaps(contacts, x);
+    const Reals gap = hn::IfThenElse(free, found.least, far);
     nearest = hn::Min(nearest, gap);
     const auto touching = hn::Lt(gap, real(0));
     if (hn::AllFalse(d, touching)) continue;
 
     const Places before = exact(state.d, state.d_error);
     Places moved = before;
-    resolve_places(contacts, touching, x, moved);
+    resolve_places(contacts, touching, found.first, x, moved);
 
     HWY_ALIGN double touched[Lanes::kMost];
     hn::Store(hn::IfThenElseZero(touching, real(1)), d, touched);

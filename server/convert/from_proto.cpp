@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <optional>
 #include <set>
 
+#include "core/model/text.h"
 #include "server/convert/convert.h"
 #include "server/convert/mesh.h"
 #include "server/textiles/catalogue.h"
@@ -101,10 +103,13 @@ class Reader {
   Environment environment(const v1::Environment& from);
   SolverSettings solver(const v1::SolverSettings& from);
 
-  std::shared_ptr<const v1::MeshData> mesh(const v1::TriangleSheet& from, const std::string& field);
+  template <class Source>
+  std::shared_ptr<const v1::MeshData> mesh(const Source& from, const std::string& field);
+  void set_body(const v1::BodyMesh& from, const std::string& field, Collider& collider);
 
   const FindMesh& find_mesh_;
   Accuracy accuracy_ = Accuracy::kStandard;
+  double largest_skin_ = 0;  // of the sheets, m
   std::vector<Problem> problems_;
   std::vector<std::string> stand_ins_;  // beginnings of paths
 };
@@ -116,6 +121,9 @@ Scene Reader::scene(const v1::Scene& from) {
   for (int i = 0; i < from.sheets_size(); ++i) {
     scene.sheets.push_back(sheet(from.sheets(i), at("sheets", i)));
     scene.sheets.back().name = sheet_names[static_cast<std::size_t>(i)];
+    if (const double skin = scene.sheets.back().skin_or_default();
+        skin <= 1)  // larger ones are refused
+      largest_skin_ = std::max(largest_skin_, skin);
   }
   const auto collider_names = names("collider", from.colliders());
   for (int i = 0; i < from.colliders_size(); ++i) {
@@ -176,12 +184,12 @@ void Reader::set_shape(const v1::Sheet& from, const std::string& field, SheetDef
 }
 
 // nullptr where there is none, which is said.
-std::shared_ptr<const v1::MeshData> Reader::mesh(const v1::TriangleSheet& from,
-                                                 const std::string& field) {
+template <class Source>
+std::shared_ptr<const v1::MeshData> Reader::mesh(const Source& from, const std::string& field) {
   switch (from.source_case()) {
-    case v1::TriangleSheet::kData:
+    case Source::kData:
       return {std::shared_ptr<const void>(), &from.data()};  // the scene's own, which stays
-    case v1::TriangleSheet::kAsset: {
+    case Source::kAsset: {
       auto found = find_mesh_ ? find_mesh_(from.asset()) : nullptr;
       if (!found)
         problem(
@@ -189,7 +197,7 @@ std::shared_ptr<const v1::MeshData> Reader::mesh(const v1::TriangleSheet& from,
             "\"" + from.asset() + "\" is no asset of yours that is whole; UploadAsset makes one");
       return found;
     }
-    case v1::TriangleSheet::SOURCE_NOT_SET:
+    case Source::SOURCE_NOT_SET:
       problem(field + ".source", "is absent; give data or asset");
       return nullptr;
   }
@@ -298,13 +306,36 @@ Collider Reader::collider(const v1::Collider& from, const std::string& field) {
       collider.shape = Capsule{vector(from.capsule().start_m()), vector(from.capsule().end_m()),
                                from.capsule().radius_m()};
       break;
+    case v1::Collider::kMesh:
+      set_body(from.mesh(), field, collider);
+      break;
     case v1::Collider::SHAPE_NOT_SET:
-      problem(field + ".shape", "is absent; give plane, sphere, box or capsule");
+      problem(field + ".shape", "is absent; give plane, sphere, box, capsule or mesh");
       break;
   }
   if (from.has_friction_coefficient()) collider.friction = from.friction_coefficient();
   collider.path = to_path(from.path());
   return collider;
+}
+
+void Reader::set_body(const v1::BodyMesh& from, const std::string& field, Collider& collider) {
+  constexpr double kLeast = 1e-6, kMost = 1e4;  // m
+  const std::string path = field + (from.has_data() ? ".mesh.data" : ".mesh.asset");
+  if (from.has_cell_m()) collider.cell = from.cell_m();
+  // a plane stands in for what is faulty
+  if (collider.cell && !(*collider.cell >= kLeast && *collider.cell <= kMost))
+    return problem(field + ".mesh.cell_m",
+                   join(*collider.cell, " m is not within ", kLeast, " to ", kMost, " m"));
+  const auto data = mesh(from, field + ".mesh");
+  if (!data) return;
+  // in steps, for scenes to share bodies
+  const double reach = std::exp2(std::ceil(std::log2(std::max(largest_skin_, 1e-3))));
+  auto made = to_body(*data, collider.cell, reach, path);
+  if (auto* problems = std::get_if<std::vector<Problem>>(&made))
+    std::move(problems->begin(), problems->end(), std::back_inserter(problems_));
+  else
+    collider.shape = std::get<SharedBody>(std::move(made));
+  if (from.has_asset()) collider.asset = from.asset();
 }
 
 Environment Reader::environment(const v1::Environment& from) {

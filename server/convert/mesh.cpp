@@ -7,8 +7,13 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <vector>
 
+#include "core/contact/body.h"
+#include "core/contact/mend.h"
 #include "core/model/mesh_problems.h"
 #include "core/model/text.h"
 
@@ -49,6 +54,36 @@ std::vector<Point> points_of(const std::string& bytes) {
 // Indices that no int holds are negative: out of range.
 std::vector<std::array<int, 3>> triangles_of(const std::string& bytes) {
   return values_of<std::array<int, 3>>(bytes);
+}
+
+void check_size(const std::string& bytes, std::size_t unit, const std::string& field,
+                std::vector<Problem>& problems) {
+  if (bytes.size() % unit != 0)
+    problems.push_back(
+        {field, join("has ", bytes.size(), " bytes, which is no multiple of ", unit)});
+}
+
+// Sessions with the same body share it, as long as one of them is there.
+MadeBody shared_body(const v1::MeshData& from, const BodySettings& settings,
+                     const std::string& field) {
+  static std::mutex mutex;
+  static std::map<std::string, std::weak_ptr<const Body>> bodies;
+  const std::string key = from.positions_m() + from.triangles() +
+                          bytes_of(std::vector{static_cast<double>(from.positions_m().size()),
+                                               settings.cell, settings.reach});
+  {
+    const std::lock_guard lock(mutex);
+    const auto known = bodies.find(key);
+    if (known != bodies.end())
+      if (auto body = known->second.lock()) return {std::move(body), {}};
+  }
+  MadeBody made = make_body(
+      {points_of<Vector3d>(from.positions_m()), triangles_of(from.triangles())}, settings, field);
+  if (!made.body) return made;
+  const std::lock_guard lock(mutex);
+  std::erase_if(bodies, [](const auto& each) { return each.second.expired(); });
+  bodies[key] = made.body;
+  return made;
 }
 
 struct Edges {
@@ -107,15 +142,10 @@ std::array<std::array<double, 3>, 3> corners(const v1::MeshData& mesh, const Tri
 
 Converted<Triangles> to_mesh(const v1::MeshData& from, const std::string& field) {
   std::vector<Problem> problems;
-  const auto check = [&](const char* name, const std::string& bytes, std::size_t size) {
-    if (bytes.size() % size != 0)
-      problems.push_back({join(field, ".", name),
-                          join("has ", bytes.size(), " bytes, which is no multiple of ", size)});
-  };
-  check("positions_m", from.positions_m(), 12);
-  check("triangles", from.triangles(), sizeof(Triangle));
-  check("flat_m", from.flat_m(), 8);
-  check("flat_triangles", from.flat_triangles(), sizeof(Triangle));
+  check_size(from.positions_m(), 12, field + ".positions_m", problems);
+  check_size(from.triangles(), sizeof(Triangle), field + ".triangles", problems);
+  check_size(from.flat_m(), 8, field + ".flat_m", problems);
+  check_size(from.flat_triangles(), sizeof(Triangle), field + ".flat_triangles", problems);
   if (from.positions_m().empty() && (from.flat_m().empty() || !from.flat_triangles().empty()))
     problems.push_back({field + ".positions_m",
                         "is absent; give positions, or a flat shape of which every corner is a "
@@ -133,6 +163,36 @@ Converted<Triangles> to_mesh(const v1::MeshData& from, const std::string& field)
   problems = find_problems(*made, field);
   if (problems.empty()) return made;
   return problems;
+}
+
+Converted<SharedBody> to_body(const v1::MeshData& from, std::optional<double> cell, double reach,
+                              const std::string& field) {
+  std::vector<Problem> problems;
+  check_size(from.positions_m(), 12, field + ".positions_m", problems);
+  check_size(from.triangles(), sizeof(Triangle), field + ".triangles", problems);
+  const auto refuse = [&](bool given, const char* name) {
+    if (given) problems.push_back({join(field, ".", name), "is for sheets; a body has none"});
+  };
+  refuse(!from.flat_m().empty(), "flat_m");
+  refuse(!from.flat_triangles().empty(), "flat_triangles");
+  refuse(from.panels_size() > 0, "panels");
+  if (!problems.empty()) return problems;
+  MadeBody made = shared_body(from, {cell.value_or(0), reach}, field);
+  if (made.body) return std::move(made.body);
+  return std::move(made.problems);
+}
+
+std::vector<Problem> find_problems(const v1::MeshData& mesh, const std::string& field) {
+  auto sheet = to_mesh(mesh, field);
+  if (std::holds_alternative<Triangles>(sheet)) return {};
+  if (!mesh.positions_m().empty()) {
+    auto body =
+        mend({points_of<Vector3d>(mesh.positions_m()), triangles_of(mesh.triangles())}, field);
+    const bool whole =
+        mesh.positions_m().size() % 12 == 0 && mesh.triangles().size() % sizeof(Triangle) == 0;
+    if (whole && (body.problems.empty() || mesh.flat_m().empty())) return std::move(body.problems);
+  }
+  return std::get<std::vector<Problem>>(std::move(sheet));
 }
 
 v1::MeshData topology_of(const SheetShape& shape) {

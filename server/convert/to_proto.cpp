@@ -132,6 +132,9 @@ void set(v1::Collider* to, const Capsule& capsule) {
   to->mutable_capsule()->set_radius_m(capsule.radius);
 }
 
+// The rest is the collider's.
+void set(v1::Collider* to, const SharedBody& /*body*/) { to->mutable_mesh(); }
+
 void set(v1::Environment* to, const Environment& from) {
   set(to->mutable_gravity_m_per_s2(), from.gravity);
   if (!from.wind) return;
@@ -164,6 +167,8 @@ void set(v1::Scene* to, const Scene& from, const std::vector<Textile>& textiles,
     v1::Collider* added = to->add_colliders();
     added->set_name(collider.name);
     std::visit([&](const auto& shape) { set(added, shape); }, collider.shape);
+    if (added->has_mesh()) added->mutable_mesh()->set_asset(collider.asset);
+    if (collider.cell) added->mutable_mesh()->set_cell_m(*collider.cell);
     added->set_friction_coefficient(collider.friction);
     *added->mutable_path() = to_proto(collider.path);
   }
@@ -182,6 +187,8 @@ std::set<std::string> assets_of(const Scene& scene) {
   std::set<std::string> hashes;
   for (const auto& sheet : scene.sheets)
     if (!sheet.asset.empty()) hashes.insert(hash_of(sheet.asset));
+  for (const auto& collider : scene.colliders)
+    if (!collider.asset.empty()) hashes.insert(hash_of(collider.asset));
   return hashes;
 }
 

@@ -21,9 +21,8 @@ std::variant<v1::MeshFacts, grpc::Status> look_at(const KeptAsset& asset,
   v1::MeshData mesh;
   if (!mesh.ParseFromString(bytes))
     return errors::field_invalid("data", "the bytes are no weft.v1.MeshData");
-  const auto made = to_mesh(mesh, "data");
-  if (const auto* problems = std::get_if<std::vector<Problem>>(&made))
-    return errors::field_invalid(*problems);
+  if (const auto problems = find_problems(mesh, "data"); !problems.empty())
+    return errors::field_invalid(problems);
   return facts_of(mesh);
 }
 
@@ -56,14 +55,17 @@ std::shared_ptr<const v1::MeshData> find_mesh(Assets& assets, const Caller& call
 
 std::map<std::string, NewAsset> name_meshes(const v1::Scene& given, Scene& scene) {
   std::map<std::string, NewAsset> fresh;
-  for (std::size_t i = 0; i < scene.sheets.size(); ++i) {
-    const v1::TriangleSheet& triangles = given.sheets(static_cast<int>(i)).triangles();
-    if (!triangles.has_data()) continue;
-    std::string bytes = triangles.data().SerializeAsString();
+  const auto add = [&](const auto& source, std::string& name) {
+    if (!source.has_data()) return;
+    std::string bytes = source.data().SerializeAsString();
     const std::string hash = sha256(bytes);
-    scene.sheets[i].asset = asset_name(hash);
-    fresh.try_emplace(hash, NewAsset{std::move(bytes), facts_of(triangles.data())});
-  }
+    name = asset_name(hash);
+    fresh.try_emplace(hash, NewAsset{std::move(bytes), facts_of(source.data())});
+  };
+  for (std::size_t i = 0; i < scene.sheets.size(); ++i)
+    add(given.sheets(static_cast<int>(i)).triangles(), scene.sheets[i].asset);
+  for (std::size_t i = 0; i < scene.colliders.size(); ++i)
+    add(given.colliders(static_cast<int>(i)).mesh(), scene.colliders[i].asset);
   return fresh;
 }
 

@@ -33,10 +33,14 @@ std::int64_t particles_of(const v1::Scene& scene) {
   return particles;
 }
 
-// What is uploaded is large, as a rule.
-bool names_asset(const v1::Scene& scene) {
-  return std::any_of(scene.sheets().begin(), scene.sheets().end(),
-                     [](const v1::Sheet& sheet) { return sheet.triangles().has_asset(); });
+// What is uploaded is, as a rule; bodies take their time to be made.
+bool is_large(const v1::Scene& scene) {
+  const auto large = [](const auto& all, const auto& is) {
+    return std::any_of(all.begin(), all.end(), is);
+  };
+  return large(scene.sheets(),
+               [](const v1::Sheet& sheet) { return sheet.triangles().has_asset(); }) ||
+         large(scene.colliders(), [](const v1::Collider& collider) { return collider.has_mesh(); });
 }
 
 std::int64_t particles_of(const Scene& scene) {
@@ -80,7 +84,7 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
   if (const auto status = refusal(who, *request, request->session_id()); !status.ok())
     return answer(context, status);
   const v1::Scene& scene = request->session().scene();
-  return create_later(names_asset(scene) ? kLarge + 1 : particles_of(scene), response,
+  return create_later(is_large(scene) ? kLarge + 1 : particles_of(scene), response,
                       [this, who, request = *request](v1::Session& session) {
                         return create(who, request, session);
                       });

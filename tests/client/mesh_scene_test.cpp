@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "client/imports/import.h"
 #include "client/imports/mesh_facts.h"
@@ -18,6 +19,7 @@ using client::import_mesh;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 class MeshScene : public ::testing::Test {
@@ -124,6 +126,41 @@ TEST_F(MeshScene, OfFaultyFilesNamesEveryPlace) {
   EXPECT_EQ(made.exit, 4);
   EXPECT_THAT(made.err,
               AllOf(HasSubstr("a.obj"), HasSubstr("line 2"), HasSubstr("line 3 (face 1)")));
+}
+
+TEST_F(MeshScene, HasBodiesFromFilesInTheUnitAskedFor) {
+  write_file(directory_.path("block.obj"),
+             "v -5 -5 -5\nv 5 -5 -5\nv -5 5 -5\nv 5 5 -5\n"
+             "v -5 -5 5\nv 5 -5 5\nv -5 5 5\nv 5 5 5\n"
+             "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n");
+  const std::string file = directory_.path("scene.json");
+  const Outcome made = run_weft({"scene", "new", "--template", "hang", "--body",
+                                 directory_.path("block.obj"), "--unit", "cm", "-o", file});
+  ASSERT_EQ(made.exit, 0) << made.err;
+  EXPECT_THAT(made.out, HasSubstr("block: 12 triangles"));
+  const v1::Scene scene = client::read_scene(file);
+  ASSERT_GE(scene.colliders_size(), 1);
+  const v1::Collider& body = *scene.colliders().rbegin();
+  EXPECT_EQ(body.name(), "block");
+  float first = 0;
+  std::memcpy(&first, body.mesh().data().positions_m().data(), sizeof first);
+  EXPECT_FLOAT_EQ(first, -0.05F);
+  EXPECT_EQ(run_weft({"scene", "check", file}).exit, 0);
+}
+
+TEST_F(MeshScene, IsWornByADressFormOfTheGirthsAskedFor) {
+  const std::string body = directory_.path("body.glb"), file = directory_.path("scene.json");
+  const Outcome made = run_weft({"--json", "body", "new", "--figure", "female", "--stature", "1.72",
+                                 "--bust", "0.96", "--waist", "0.8", "--hip", "1.04", "-o", body});
+  ASSERT_EQ(made.exit, 0) << made.err;
+  const auto answer = nlohmann::json::parse(made.out);
+  EXPECT_NEAR(answer["stature_m"], 1.72, 1e-9);
+  for (const auto& girth : answer["girths"])
+    EXPECT_NEAR(girth["found_m"], girth["wanted_m"], 5e-3) << girth["name"];
+  ASSERT_EQ(run_weft({"scene", "new", "--template", "hang", "--body", body, "-o", file}).exit, 0);
+  const Outcome checked = run_weft({"scene", "check", file});
+  EXPECT_EQ(checked.exit, 0) << checked.err;
+  EXPECT_THAT(checked.out, Not(HasSubstr("BODY_")));
 }
 
 TEST_F(MeshScene, IsWhatACheckOfAMeshLeadsTo) {

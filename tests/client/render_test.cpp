@@ -138,6 +138,22 @@ TEST_F(RenderTest, ShowsASheetInItsShapeWithinThePicture) {
   EXPECT_GT(back.at(50, 35).colour(), 30);
 }
 
+TEST_F(RenderTest, BodiesOfTrianglesAreSeenWhereTheyStand) {
+  v1::Scene scene = standing_square();
+  scene.mutable_sheets(0)->mutable_grid()->set_spacing_m(0.05);
+  *scene.add_colliders()->mutable_mesh()->mutable_data() = cube_mesh(0.1F, 0, -0.35F, 0);
+  const auto blue_pixels = [&](const std::string& recording) {
+    const Image image = render({recording, "--size", "100x100"});
+    int count = 0;
+    for (int y = 0; y < 100; ++y)
+      for (int x = 0; x < 100; ++x) count += image.at(x, y).blue > image.at(x, y).red + 8 ? 1 : 0;
+    return count;
+  };
+  const int with = blue_pixels(record(scene, "with"));
+  scene.clear_colliders();
+  EXPECT_GT(with, blue_pixels(record(scene, "without")) + 75);
+}
+
 TEST_F(RenderTest, BodiesCastShadowsOnAPlane) {
   v1::Scene scene = standing_square();
   scene.mutable_sheets(0)->mutable_grid()->set_spacing_m(0.05);

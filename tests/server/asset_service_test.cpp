@@ -131,6 +131,18 @@ TEST_F(AssetTest, ThatIsNoMeshIsRefusedWithEveryFault) {
   EXPECT_THAT(list_assets(assets()).assets(), IsEmpty());
 }
 
+TEST_F(AssetTest, MayBeABodyWhichIsClosed) {
+  v1::MeshData cube = cube_mesh(0.1F, 0, 0, 0);
+  const auto [asset, error] = upload(assets(), cube.SerializeAsString());
+  ASSERT_EQ(error.code, grpc::StatusCode::OK) << error.message;
+  EXPECT_TRUE(asset.mesh().closed());
+  EXPECT_EQ(asset.mesh().triangles(), 12);
+  EXPECT_NEAR(asset.mesh().flat_area_m2(), 6 * 0.04, 1e-6);
+  cube.mutable_triangles()->resize(11 * 12);
+  EXPECT_THAT(upload(assets(), cube.SerializeAsString()).second.fields(),
+              ::testing::Contains("data.triangles"));
+}
+
 TEST_F(AssetTest, IsListedInOrderOfNameOnPages) {
   std::vector<std::string> names;
   for (int cells = 1; cells <= 5; ++cells)

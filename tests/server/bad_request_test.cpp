@@ -76,11 +76,17 @@ TEST(GoodScenes, AreShownAsTheyWereGiven) {
   v1::Scene given = full_scene();
   given.mutable_sheets()->RemoveLast();  // a preset is shown by its values
   upload(*service.assets, known_asset());
+  upload(*service.assets, known_body());
   const v1::Scene shown = service.create(given).scene();
   for (v1::Sheet& sheet : *given.mutable_sheets()) {
     if (!sheet.triangles().has_data()) continue;  // a mesh is shown by its name
     const std::string bytes = sheet.triangles().data().SerializeAsString();
     sheet.mutable_triangles()->set_asset(name_of_asset(bytes));
+  }
+  for (v1::Collider& collider : *given.mutable_colliders()) {
+    if (!collider.mesh().has_data()) continue;
+    const std::string bytes = collider.mesh().data().SerializeAsString();
+    collider.mutable_mesh()->set_asset(name_of_asset(bytes));
   }
   google::protobuf::util::MessageDifferencer differencer;
   differencer.set_scope(google::protobuf::util::MessageDifferencer::PARTIAL);
@@ -136,7 +142,8 @@ class Subject {
     const auto page = list_assets(*service_.assets);
     for (const auto& asset : page.assets())
       EXPECT_EQ(delete_asset(*service_.assets, asset.name()).code, grpc::StatusCode::OK);
-    EXPECT_EQ(upload(*service_.assets, known_asset()).second.code, grpc::StatusCode::OK);
+    for (const std::string& bytes : {known_asset(), known_body()})
+      EXPECT_EQ(upload(*service_.assets, bytes).second.code, grpc::StatusCode::OK);
     session_ = service_.create(small_scene(), "it");
     v1::CreateSnapshotRequest snapshot;
     snapshot.set_parent(session_.name());

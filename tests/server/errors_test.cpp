@@ -1,5 +1,6 @@
 #include <limits>
 
+#include "tests/support/service/assets.h"
 #include "tests/support/service/service.h"
 
 // Code, reason and details of every error.
@@ -55,6 +56,28 @@ TEST(Errors, OfAMissingSceneSheetOrTextileNameIt) {
   empty_sheet.add_sheets();
   EXPECT_THAT(service.create_error(empty_sheet).fields(),
               ElementsAre("session.scene.sheets[0].mesh", "session.scene.sheets[0].textile"));
+}
+
+TEST(Errors, OfBodiesNameThePlaceWhereTheyAreOpen) {
+  Service service;
+  v1::Scene scene = small_scene();
+  v1::MeshData& mesh = *scene.add_colliders()->mutable_mesh()->mutable_data();
+  mesh = cube_mesh(0.1F, 0, -1, 0);
+  mesh.mutable_triangles()->resize(11 * 12);
+  const Error error = service.create_error(scene);
+  expect_error(error, grpc::StatusCode::INVALID_ARGUMENT, "FIELD_INVALID");
+  EXPECT_THAT(error.fields(), Contains("session.scene.colliders[0].mesh.data.triangles"));
+  EXPECT_THAT(error.bad.field_violations(0).description(), HasSubstr("open"));
+  scene.mutable_colliders(0)->mutable_mesh()->set_asset("assets/none");
+  EXPECT_THAT(service.create_error(scene).fields(),
+              ElementsAre("session.scene.colliders[0].mesh.asset"));
+  scene.mutable_colliders(0)->mutable_mesh()->clear_source();
+  EXPECT_THAT(service.create_error(scene).fields(),
+              ElementsAre("session.scene.colliders[0].mesh.source"));
+  *scene.mutable_colliders(0)->mutable_mesh()->mutable_data() = cube_mesh(0.1F, 0, -1, 0);
+  scene.mutable_colliders(0)->mutable_mesh()->set_cell_m(-1);
+  EXPECT_THAT(service.create_error(scene).fields(),
+              ElementsAre("session.scene.colliders[0].mesh.cell_m"));
 }
 
 TEST(Errors, OfPresetsSayWhatTheyLack) {

@@ -118,6 +118,10 @@ v1::Scene full_scene() {
   set(capsule->mutable_start_m(), 2, -2, 0);
   set(capsule->mutable_end_m(), 2, -2, 1);
   capsule->set_radius_m(0.1);
+  v1::BodyMesh* body = scene.add_colliders()->mutable_mesh();
+  *body->mutable_data() = cube_mesh(0.1F, 4, -2, 0);
+  body->set_cell_m(0.01);
+  scene.add_colliders()->mutable_mesh()->set_asset(name_of_asset(known_body()));
   for (v1::Collider& collider : *scene.mutable_colliders()) {
     collider.set_friction_coefficient(0.2);
     add_path(&collider);
@@ -140,6 +144,7 @@ v1::Scene full_scene() {
   return scene;
 }
 
+std::string known_body() { return cube_mesh(0.1F, 3, -2, 0).SerializeAsString(); }
 std::string known_asset() { return square_mesh(1).SerializeAsString(); }
 
 std::vector<std::string> known_requests(const std::string& type) {

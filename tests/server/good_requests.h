@@ -16,6 +16,8 @@ v1::Scene full_scene();
 
 // Bytes of the asset that requests speak of.
 std::string known_asset();
+// Of its body.
+std::string known_body();
 
 // Good requests of a type, as text; of a type that has none here they are made up from its fields.
 std::vector<std::string> known_requests(const std::string& type);

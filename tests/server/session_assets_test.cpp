@@ -92,6 +92,31 @@ TEST_F(SessionAssets, GoOnAfterARestartWithTheSameFrames) {
   EXPECT_EQ(listed.sessions(0).scene().sheets(0).triangles().asset(), name_);
 }
 
+TEST_F(SessionAssets, HoldTheMeshesOfBodiesAsThoseOfSheets) {
+  v1::Scene scene = small_scene();
+  const v1::MeshData cube = cube_mesh(0.2F, 0.1F, -0.3F, 0.1F);
+  const std::string name = name_of_asset(cube.SerializeAsString());
+  *scene.add_colliders()->mutable_mesh()->mutable_data() = cube;
+  v1::Session session = service_->create(scene);
+  EXPECT_EQ(session.scene().colliders(0).mesh().asset(), name);
+  service_->step(session, 20);
+  RestartWithSnapshots::kept(session);
+  EXPECT_THAT(kept(), HasSubstr(name));
+  EXPECT_THAT(kept(), Not(HasSubstr(cube.positions_m())));
+  restart();
+  EXPECT_EQ(service_->get(session).scene().colliders(0).mesh().asset(), name);
+  service_->step(session, 5);
+  EXPECT_EQ(delete_asset(assets(), name).reason(), "ASSET_USED");
+
+  scene.mutable_colliders(0)->mutable_mesh()->set_asset(name);
+  const v1::Session undisturbed = service_->create(scene);
+  service_->step(undisturbed, 25);
+  const auto newest = [&](const v1::Session& of) {
+    return Stream(*service_, frames_of(of, 25, 25)).rest();
+  };
+  expect_equal(newest(session), newest(undisturbed));
+}
+
 TEST_F(SessionAssets, StoreNothingOfASceneThatIsOnlyLookedAt) {
   v1::CreateSessionRequest request;
   *request.mutable_session()->mutable_scene() = scene_of(mesh_);

@@ -41,6 +41,21 @@ v1::MeshData square_mesh(int cells) {
   return mesh;
 }
 
+v1::MeshData cube_mesh(float half, float x, float y, float z) {
+  const float middle[] = {x, y, z};
+  std::vector<float> planes;
+  for (int axis = 0; axis < 3; ++axis)
+    for (int corner = 0; corner < 8; ++corner)
+      planes.push_back(middle[axis] + ((corner >> axis & 1) != 0 ? half : -half));
+  const std::vector<std::uint32_t> triangles = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6,
+                                                0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7,
+                                                0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+  v1::MeshData mesh;
+  mesh.set_positions_m(bytes_of(planes));
+  mesh.set_triangles(bytes_of(triangles));
+  return mesh;
+}
+
 v1::Scene scene_of(const v1::MeshData& mesh) {
   v1::Scene scene = scene_of(std::string());
   *scene.mutable_sheets(0)->mutable_triangles()->mutable_data() = mesh;

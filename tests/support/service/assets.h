@@ -14,6 +14,9 @@ namespace weft::testing {
 // A flat square of 1 m x 1 m in cells x cells x 2 triangles, its flat shape what it is in space.
 v1::MeshData square_mesh(int cells);
 
+// A closed cube of 12 triangles around a point, with edges of 2 x `half`, m.
+v1::MeshData cube_mesh(float half, float x, float y, float z);
+
 // A sheet of the mesh, held by its first particle. By itself, or by the name of an asset.
 v1::Scene scene_of(const v1::MeshData& mesh);
 v1::Scene scene_of(const std::string& asset);

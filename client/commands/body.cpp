@@ -1,0 +1,82 @@
+#include <fmt/format.h>
+
+#include "client/commands/commands.h"
+#include "client/exports/output_file.h"
+#include "client/figures/dress_form.h"
+#include "client/figures/mesh_file.h"
+#include "client/output/text.h"
+
+namespace weft::client {
+namespace {
+
+struct BodyOptions {
+  Measures measures;
+  std::string path;
+  bool replace = false;
+};
+
+void run_new_body(Context& context, const BodyOptions& options) {
+  const bool binary = options.path.ends_with(".glb");
+  if (!binary && !options.path.ends_with(".obj"))
+    throw usage_problem("--output " + options.path + ": ends in neither .glb nor .obj");
+  const DressForm form = make_dress_form(options.measures);
+  write_new_file(options.path, binary ? glb_of(form.mesh) : obj_of(form.mesh), options.replace);
+
+  std::string text = fmt::format("stature     {:.3f} m\n", form.stature);
+  Json girths = Json::array();
+  for (const DressForm::Girth& girth : form.girths) {
+    text += fmt::format("{:<11} {:.3f} m, at a height of {:.3f} m\n", girth.name, girth.found,
+                        girth.height);
+    girths.push_back({{"name", girth.name},
+                      {"wanted_m", girth.wanted},
+                      {"found_m", girth.found},
+                      {"height_m", girth.height}});
+  }
+  const auto triangles = static_cast<std::int64_t>(form.mesh.triangles.size());
+  text += fmt::format("wrote {}: {}\n", options.path, count_of(triangles, "triangle"));
+  context.answer({{"file", options.path},
+                  {"stature_m", form.stature},
+                  {"girths", std::move(girths)},
+                  {"triangles", triangles}},
+                 text);
+}
+
+}  // namespace
+
+void add_body(CLI::App& app, Context& context) {
+  const std::map<std::string, FigureKind> figures{{"female", FigureKind::kFemale}, {"male", FigureKind::kMale}};
+  CLI::App* body = add_group(app, "body", "Make bodies for cloth to be worn by");
+  auto options = std::make_shared<BodyOptions>();
+  Measures& measures = options->measures;
+  CLI::App* command =
+      body->add_subcommand("new", "Write a dress form by the tape: a standing, closed figure");
+  command->add_option("--figure", measures.figure, "Of the form; else female")
+      ->transform(one_of(figures))
+      ->option_text("female|male");
+  const auto length = [&](const char* name, std::optional<double>& value, const char* description,
+                          double least, double most) {
+    command->add_option(name, value, description)->type_name("M")->check(CLI::Range(least, most));
+  };
+  length("--stature", measures.stature, "Height of the person, m", 1.2, 2.2);
+  length("--bust", measures.bust, "Bust or chest girth, m", 0.6, 1.8);
+  length("--underbust", measures.underbust, "Underbust girth, m", 0.5, 1.7);
+  length("--waist", measures.waist, "Waist girth, m", 0.45, 1.8);
+  length("--top-hip", measures.top_hip, "Top hip girth, m", 0.55, 1.8);
+  length("--hip", measures.hip, "Hip girth, m", 0.6, 1.9);
+  command->add_option("--arm-angle", measures.arm_angle, "Of the arms below the level, degrees")
+      ->type_name("DEG")
+      ->check(CLI::Range(0.0, 70.0));
+  command->add_option("-o,--output", options->path, "File to write: .glb or .obj")
+      ->type_name("FILE")
+      ->required();
+  command->add_flag("--force", options->replace, "Replace a file that exists");
+  command->footer(R"(
+Girths are those of ISO 8559-1; what is not given follows from the rest. The form
+has its feet at y = 0 and looks along z.
+  weft body new --figure female --bust 0.92 --waist 0.74 --hip 1.0 -o body.glb
+  weft scene new --mesh dress.obj --body body.glb -o scene.json
+)");
+  command->callback([&context, options] { run_new_body(context, *options); });
+}
+
+}  // namespace weft::client

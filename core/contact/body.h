@@ -1,0 +1,26 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/model/body.h"
+#include "core/model/scene.h"
+
+namespace weft {
+
+// Of the grid of a body, m. Absent cells are chosen by the body's surface: a person's are 4 to 5
+// mm.
+struct BodySettings {
+  double cell = 0;   // edge of a cell; 0: chosen
+  double reach = 0;  // how far outside contact needs exact values
+};
+
+// A body, or what keeps the mesh from being one; paths begin with `field`.
+struct MadeBody {
+  std::shared_ptr<const Body> body;
+  std::vector<Problem> problems;
+};
+MadeBody make_body(BodyMesh mesh, const BodySettings& settings, const std::string& field);
+
+}  // namespace weft

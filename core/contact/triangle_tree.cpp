@@ -1,0 +1,139 @@
+#include "core/contact/triangle_tree.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+namespace weft {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::infinity();
+constexpr std::size_t kDeepest = 64;  // halving leaves no more levels
+
+double squared_from_edge(const Vector3d& a, const Vector3d& b, const Vector3d& point) {
+  const Vector3d edge = b - a, away = point - a;
+  const double length = edge.squaredNorm();
+  const double share = length > 0 ? std::clamp(away.dot(edge) / length, 0.0, 1.0) : 0;
+  return (away - share * edge).squaredNorm();
+}
+
+// Whether a ray passes through a box nearer than `most`.
+bool meets(const Eigen::AlignedBox3d& box, const Vector3d& start, const Vector3d& inverse,
+           double most) {
+  const Vector3d one = (box.min() - start).cwiseProduct(inverse);
+  const Vector3d other = (box.max() - start).cwiseProduct(inverse);
+  const double enters = one.cwiseMin(other).maxCoeff(), leaves = one.cwiseMax(other).minCoeff();
+  return enters <= std::min(leaves, most) && leaves >= 0;
+}
+
+}  // namespace
+
+TriangleTree::TriangleTree(const BodyMesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
+  std::iota(order_.begin(), order_.end(), 0);
+  std::vector<Vector3d> middles;
+  for (const int t : order_) middles.push_back((corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3);
+  build(0, static_cast<int>(order_.size()), middles);
+}
+
+void TriangleTree::build(int first, int last, const std::vector<Vector3d>& middles) {
+  constexpr int kLeaf = 2;
+  const std::size_t node = nodes_.size();
+  nodes_.emplace_back();
+  const auto begin = order_.begin() + first, end = order_.begin() + last;
+  Eigen::AlignedBox3d box, of_middles;
+  for (auto t = begin; t != end; ++t) {
+    for (std::size_t k = 0; k < 3; ++k) box.extend(corner(*t, k));
+    of_middles.extend(middles[static_cast<std::size_t>(*t)]);
+  }
+  nodes_[node].box = box;
+  if (last - first <= kLeaf) {
+    nodes_[node].first = first;
+    nodes_[node].count = last - first;
+    return;
+  }
+  Eigen::Index axis = 0;
+  of_middles.sizes().maxCoeff(&axis);
+  const int middle = first + (last - first) / 2;
+  std::nth_element(begin, order_.begin() + middle, end, [&](int a, int b) {
+    return middles[static_cast<std::size_t>(a)][axis] < middles[static_cast<std::size_t>(b)][axis];
+  });
+  build(first, middle, middles);
+  nodes_[node].first = static_cast<int>(nodes_.size());
+  build(middle, last, middles);
+}
+
+double TriangleTree::squared_distance(int triangle, const Vector3d& point) const {
+  const Vector3d &a = corner(triangle, 0), &b = corner(triangle, 1), &c = corner(triangle, 2);
+  const Vector3d ab = b - a, bc = c - b, ca = a - c, normal = ca.cross(ab);
+  // the nearest point lies on an edge that the point is beyond, or above the triangle
+  const bool beyond_ab = normal.cross(ab).dot(point - a) < 0;
+  const bool beyond_bc = normal.cross(bc).dot(point - b) < 0;
+  const bool beyond_ca = normal.cross(ca).dot(point - c) < 0;
+  const double squared = normal.squaredNorm();
+  if (!beyond_ab && !beyond_bc && !beyond_ca && squared > 0) {
+    const double height = normal.dot(point - a);
+    return height * height / squared;
+  }
+  double least = squared > 0 ? kNone : squared_from_edge(a, b, point);
+  if (beyond_ab) least = std::min(least, squared_from_edge(a, b, point));
+  if (beyond_bc || squared == 0) least = std::min(least, squared_from_edge(b, c, point));
+  if (beyond_ca || squared == 0) least = std::min(least, squared_from_edge(c, a, point));
+  return least;
+}
+
+TriangleTree::Nearest TriangleTree::nearest(const Vector3d& point, int guess) const {
+  Nearest best{squared_distance(guess, point), guess};
+  std::array<std::pair<int, double>, kDeepest> open;
+  std::size_t left = 0;
+  open[left++] = {0, nodes_[0].box.squaredExteriorDistance(point)};
+  while (left > 0) {
+    const auto [index, least] = open[--left];
+    if (least >= best.squared) continue;
+    const Node& node = nodes_[static_cast<std::size_t>(index)];
+    for (int i = node.first; i < node.first + node.count; ++i) {
+      const int t = order_[static_cast<std::size_t>(i)];
+      if (const double squared = squared_distance(t, point); squared < best.squared)
+        best = {squared, t};
+    }
+    if (node.count > 0) continue;
+    std::pair near(index + 1,
+                   nodes_[static_cast<std::size_t>(index) + 1].box.squaredExteriorDistance(point));
+    std::pair far(node.first,
+                  nodes_[static_cast<std::size_t>(node.first)].box.squaredExteriorDistance(point));
+    if (far.second < near.second) std::swap(near, far);
+    open[left++] = far;
+    open[left++] = near;
+  }
+  return best;
+}
+
+double TriangleTree::first_hit(int from, const Vector3d& start, const Vector3d& direction) const {
+  const Vector3d inverse = direction.cwiseInverse();
+  double first = kNone;
+  std::array<int, kDeepest> open;
+  std::size_t left = 0;
+  open[left++] = 0;
+  while (left > 0) {
+    const int index = open[--left];
+    const Node& node = nodes_[static_cast<std::size_t>(index)];
+    if (!meets(node.box, start, inverse, first)) continue;
+    for (int i = node.first; i < node.first + node.count; ++i) {
+      const int t = order_[static_cast<std::size_t>(i)];
+      if (t == from) continue;
+      // start + s direction = a + u ab + v ac, by Cramer's rule
+      const Vector3d &a = corner(t, 0), ab = corner(t, 1) - a, ac = corner(t, 2) - a;
+      const Vector3d to = start - a, across = direction.cross(ac), along = to.cross(ab);
+      const double scale = across.dot(ab);
+      if (scale == 0) continue;
+      const double u = across.dot(to) / scale, v = along.dot(direction) / scale;
+      const double s = along.dot(ac) / scale;
+      if (u >= 0 && v >= 0 && u + v <= 1 && s >= 0) first = std::min(first, s);
+    }
+    if (node.count > 0) continue;
+    open[left++] = node.first;
+    open[left++] = index + 1;
+  }
+  return first;
+}
+
+}  // namespace weft

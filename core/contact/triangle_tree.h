@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <limits>
+#include <vector>
+
+#include "core/model/body.h"
+
+namespace weft {
+
+// Triangles in boxes that lie in boxes: what is near to a point, or in the way of a ray.
+class TriangleTree {
+ public:
+  // Keeps hold of the mesh. Precondition: it has triangles.
+  explicit TriangleTree(const BodyMesh& mesh);
+
+  struct Nearest {
+    double squared = std::numeric_limits<double>::infinity();  // of the distance, m^2
+    int triangle = -1;
+  };
+  // The nearest triangle. A guess, any triangle's number, makes it quick where it is near.
+  Nearest nearest(const Vector3d& point, int guess) const;
+
+  // Where a ray from within triangle `from` first meets another one, m along `direction`, of length
+  // 1; infinity where it does not.
+  double first_hit(int from, const Vector3d& start, const Vector3d& direction) const;
+
+ private:
+  struct Node {
+    Eigen::AlignedBox3d box;
+    int first = 0;  // of its triangles in order_; of an inner node, its second child
+    int count = 0;  // of triangles; 0: an inner node, whose first child comes next
+  };
+  void build(int first, int last, const std::vector<Vector3d>& middles);
+  const Vector3d& corner(int triangle, std::size_t k) const {
+    const int vertex = mesh_.triangles[static_cast<std::size_t>(triangle)][k];
+    return mesh_.vertices[static_cast<std::size_t>(vertex)];
+  }
+  double squared_distance(int triangle, const Vector3d& point) const;
+
+  const BodyMesh& mesh_;
+  std::vector<int> order_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace weft

@@ -38,10 +38,9 @@ double SheetDefinition::thickness_or_default() const {
 }
 
 bool wants_cloth_contact(const Scene& scene) {
-  return scene.sheets.size() > 1 ||
-         std::any_of(scene.sheets.begin(), scene.sheets.end(), [](const SheetDefinition& sheet) {
-           return std::holds_alternative<Triangles>(sheet.shape);
-         });
+  return std::any_of(scene.sheets.begin(), scene.sheets.end(), [](const SheetDefinition& sheet) {
+    return std::holds_alternative<Triangles>(sheet.shape);
+  });
 }
 
 }  // namespace weft

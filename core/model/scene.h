@@ -171,7 +171,8 @@ struct Scene {
   SolverSettings solver;
 };
 
-// Whether cloth contact is worth having where nobody says: for triangles, and for several sheets.
+// Whether there is cloth contact where nobody says: for triangles. Grids came before it, and keep
+// their results.
 bool wants_cloth_contact(const Scene& scene);
 
 struct Problem {

@@ -130,6 +130,8 @@ Scene Reader::scene(const v1::Scene& from) {
     scene.colliders.push_back(collider(from.colliders(i), at("colliders", i)));
     scene.colliders.back().name = collider_names[static_cast<std::size_t>(i)];
   }
+  scene.cloth_contact =
+      from.has_cloth_contact() ? from.cloth_contact() : wants_cloth_contact(scene);
   scene.environment = environment(from.environment());
   scene.solver = solver(from.solver());
   return scene;
@@ -155,6 +157,7 @@ SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
     sheet.pins.push_back(to_pin(pin));
   }
   if (from.has_skin_m()) sheet.skin = from.skin_m();
+  if (from.has_thickness_m()) sheet.thickness = from.thickness_m();
   return sheet;
 }
 

@@ -108,6 +108,7 @@ void set(v1::Sheet* to, const SheetDefinition& from, const Textile& textile,
   }
   for (const auto& pin : from.pins) *to->add_pins() = to_proto(pin);
   to->set_skin_m(from.skin_or_default());
+  to->set_thickness_m(from.thickness_or_default());
 }
 
 void set(v1::Collider* to, const Plane& plane) {
@@ -172,6 +173,7 @@ void set(v1::Scene* to, const Scene& from, const std::vector<Textile>& textiles,
     added->set_friction_coefficient(collider.friction);
     *added->mutable_path() = to_proto(collider.path);
   }
+  to->set_cloth_contact(from.cloth_contact);
   set(to->mutable_environment(), from.environment);
   set(to->mutable_solver(), from.solver);
 }

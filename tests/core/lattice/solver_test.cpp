@@ -91,7 +91,7 @@ Textile measured(double shear, double drag, double damping) {
 }
 RawTextile& raw(SheetDefinition& sheet) { return std::get<RawTextile>(sheet.textile.model); }
 
-ChoiKo optimal(int segments) { return {.segments = segments, .optimal_breakpoints = true}; }
+ChoiKo optimal_law(int segments) { return {.segments = segments, .optimal_breakpoints = true}; }
 
 const Feature kFeatures[] = {
     {"EverythingOn", [](SheetDefinition&) {}},
@@ -107,11 +107,11 @@ const Feature kFeatures[] = {
     {"Drag", [](SheetDefinition& s) { raw(s).air_drag = 0.02; }},
     {"TwoSegments", [](SheetDefinition& s) { s.bending = ChoiKo{.segments = 2}; }},
     {"SixtySegments", [](SheetDefinition& s) { s.bending = ChoiKo{.segments = 60}; }},
-    {"OptimalBreakpoints", [](SheetDefinition& s) { s.bending = optimal(32); }},
-    {"SixtySegmentsAtOptimalBreakpoints", [](SheetDefinition& s) { s.bending = optimal(60); }},
+    {"OptimalBreakpoints", [](SheetDefinition& s) { s.bending = optimal_law(32); }},
+    {"SixtySegmentsAtOptimalBreakpoints", [](SheetDefinition& s) { s.bending = optimal_law(60); }},
     {"ThreeSegmentsAtOptimalBreakpointsNoDiagonalBendNoShear",
      [](SheetDefinition& s) {
-       ChoiKo law = optimal(3);
+       ChoiKo law = optimal_law(3);
        law.diagonal_bend = false;
        raw(s).shear = 0, s.bending = law;
      }},

@@ -11,7 +11,7 @@ namespace weft::testing {
 namespace {
 
 // Warp along x, weft along z: both stretched, then sheared by the angle whose sine is 0.1.
-std::vector<double> stretched(const SheetShape& shape) {
+std::vector<double> deformed(const SheetShape& shape) {
   SheetDefinition sheet;
   sheet.shape = shape;
   const Matrix3Xd x = start_positions(sheet);
@@ -33,7 +33,7 @@ TEST(Strain, OfEveryTriangleIsThatOfItsThreads) {
        {SheetShape(Grid{4, 5, 0.05}),
         SheetShape(complete(triangle_mesh(square(Cut::kAlternating, 0.2, 0.05)))),
         SheetShape(complete(turned))}) {
-    const std::vector<double> strains = strains_of(stretched(shape), {shape});
+    const std::vector<double> strains = strains_of(deformed(shape), {shape});
     const auto triangles = static_cast<std::size_t>(triangle_count(shape));
     ASSERT_EQ(strains.size(), 3 * triangles);
     for (std::size_t t = 0; t < triangles; ++t) {

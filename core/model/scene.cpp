@@ -37,10 +37,4 @@ double SheetDefinition::thickness_or_default() const {
   return thickness.value_or(std::min(kUsual, most_thickness(*this)));
 }
 
-bool wants_cloth_contact(const Scene& scene) {
-  return std::any_of(scene.sheets.begin(), scene.sheets.end(), [](const SheetDefinition& sheet) {
-    return std::holds_alternative<Triangles>(sheet.shape);
-  });
-}
-
 }  // namespace weft

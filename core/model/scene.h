@@ -171,10 +171,6 @@ struct Scene {
   SolverSettings solver;
 };
 
-// Whether there is cloth contact where nobody says: for triangles. Grids came before it, and keep
-// their results.
-bool wants_cloth_contact(const Scene& scene);
-
 struct Problem {
   std::string field;    // path in a scene file, "sheets[0].grid.rows"
   std::string message;  // with the value and its bounds

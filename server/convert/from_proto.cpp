@@ -130,8 +130,7 @@ Scene Reader::scene(const v1::Scene& from) {
     scene.colliders.push_back(collider(from.colliders(i), at("colliders", i)));
     scene.colliders.back().name = collider_names[static_cast<std::size_t>(i)];
   }
-  scene.cloth_contact =
-      from.has_cloth_contact() ? from.cloth_contact() : wants_cloth_contact(scene);
+  scene.cloth_contact = from.cloth_contact();
   scene.environment = environment(from.environment());
   scene.solver = solver(from.solver());
   return scene;

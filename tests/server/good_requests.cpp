@@ -82,7 +82,6 @@ v1::Scene full_scene() {
   add_path(sheet->mutable_pins(0));
   sheet->set_skin_m(0.001);
   sheet->set_thickness_m(0.002);
-  scene.set_cloth_contact(false);
 
   v1::Sheet* measured = scene.add_sheets();
   *measured->mutable_grid() = sheet->grid();

@@ -122,7 +122,9 @@ v1::Scene full_scene() {
   v1::BodyMesh* body = scene.add_colliders()->mutable_mesh();
   *body->mutable_data() = cube_mesh(0.1F, 4, -2, 0);
   body->set_cell_m(0.01);
-  scene.add_colliders()->mutable_mesh()->set_asset(name_of_asset(known_body()));
+  v1::BodyMesh* uploaded_body = scene.add_colliders()->mutable_mesh();
+  uploaded_body->set_asset(name_of_asset(known_body()));
+  uploaded_body->set_cell_m(0.02);
   for (v1::Collider& collider : *scene.mutable_colliders()) {
     collider.set_friction_coefficient(0.2);
     add_path(&collider);

@@ -44,7 +44,8 @@ void run_new_body(Context& context, const BodyOptions& options) {
 }  // namespace
 
 void add_body(CLI::App& app, Context& context) {
-  const std::map<std::string, FigureKind> figures{{"female", FigureKind::kFemale}, {"male", FigureKind::kMale}};
+  const std::map<std::string, FigureKind> figures{{"female", FigureKind::kFemale},
+                                                  {"male", FigureKind::kMale}};
   CLI::App* body = add_group(app, "body", "Make bodies for cloth to be worn by");
   auto options = std::make_shared<BodyOptions>();
   Measures& measures = options->measures;

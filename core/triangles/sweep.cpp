@@ -391,18 +391,24 @@ void TriangleState<T>::prepare(const TriangleLaw<T>& law) {
   if (law.drags) drag = AlignedArray<T>(size());
   next_w = AlignedArray<T>(size());
   next_x = AlignedArray<T>(size());
+  prepare(law, 1);
+}
+
+template <class T>
+void TriangleState<T>::prepare(const TriangleLaw<T>& law, std::size_t bands) {
+  while (copies.size() < bands) {
+    const std::size_t particles = 4 * law.most_particles;
+    const std::size_t triangles = law.most_groups * TriangleLaw<T>::kLanes;
+    copies.push_back({AlignedArray<T>(particles), AlignedArray<T>(particles),
+                      AlignedArray<T>(3 * triangles + TriangleLaw<T>::kLanes),
+                      AlignedArray<T>(law.wind.blows ? 4 * triangles : 0)});
+  }
 }
 
 template <class T>
 T sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool) {
-  constexpr std::size_t kLanes = TriangleLaw<T>::kLanes;
   const auto count = static_cast<std::size_t>(bands);
-  while (state.copies.size() < count) {
-    const std::size_t particles = 4 * law.most_particles, triangles = law.most_groups * kLanes;
-    state.copies.push_back({AlignedArray<T>(particles), AlignedArray<T>(particles),
-                            AlignedArray<T>(3 * triangles + kLanes),
-                            AlignedArray<T>(law.wind.blows ? 4 * triangles : 0)});
-  }
+  state.prepare(law, count);
   std::vector<Farthest<T>> farthest(count);
   const auto share = [&](int band) {
     const auto k = static_cast<std::size_t>(band);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "core/triangles/law.h"
@@ -32,6 +33,7 @@ struct TriangleState {
   // Lets go of these, until they are prepared; step2 and drag are then to be set.
   void release_memory();
   void prepare(const TriangleLaw<T>& law);
+  void prepare(const TriangleLaw<T>& law, std::size_t bands);
 
   std::size_t size() const { return x.size(); }
 };
@@ -40,8 +42,8 @@ struct TriangleState {
 template <class T>
 using Farthest = std::array<T, 4>;
 
-// One substep. Equal bits on every processor with FMA, and
-// for every number of bands. Returns a bound of the largest displacement where law.measured, m.
+// One substep. Equal bits on every processor with FMA, and for every number of bands. Returns a
+// bound of the largest displacement where law.measured, m.
 template <class T>
 T sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool);
 

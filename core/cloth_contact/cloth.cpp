@@ -95,8 +95,9 @@ Cloth::Cloth(const std::vector<SheetDefinition>& sheets) {
     std::vector<Vector3d> centers;
     centers.reserve(given.size());
     for (const auto& [a, b, c] : given)
-      centers.push_back(local_position(definition.shape, a) + local_position(definition.shape, b) +
-                        local_position(definition.shape, c));
+      centers.emplace_back(local_position(definition.shape, a) +
+                           local_position(definition.shape, b) +
+                           local_position(definition.shape, c));
     std::vector<int> order(given.size());
     std::iota(order.begin(), order.end(), 0);
     std::vector<std::size_t> sizes;

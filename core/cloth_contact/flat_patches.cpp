@@ -83,7 +83,7 @@ FlatPatches::FlatPatches(const Cloth& cloth) : cloth_(cloth) {
       const auto& flat = cloth.flat[at];
       Eigen::Matrix2d edges;
       edges << flat[1] - flat[0], flat[2] - flat[0];
-      inverse_.push_back(edges.inverse());
+      inverse_.emplace_back(edges.inverse());
       const double longest =
           std::max({edges.col(0).norm(), edges.col(1).norm(), (flat[2] - flat[1]).norm()});
       least = std::min(least, std::abs(edges.determinant()) / longest);

@@ -31,7 +31,7 @@ bool meets(const Eigen::AlignedBox3d& box, const Vector3d& start, const Vector3d
 TriangleTree::TriangleTree(const BodyMesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
   std::iota(order_.begin(), order_.end(), 0);
   std::vector<Vector3d> middles;
-  for (const int t : order_) middles.push_back((corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3);
+  for (const int t : order_) middles.emplace_back((corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3);
   build(0, static_cast<int>(order_.size()), middles);
 }
 

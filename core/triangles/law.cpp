@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -418,7 +419,8 @@ class Packing {
   Near near(int i) const { return static_cast<Near>(nearby_.at(i) * kStride); }
 
   void fill(const Patch& patch) {
-    const int number = static_cast<int>(&patch - law_.patches.data() + law_.patches.size());
+    // none of those that find_patches() used
+    const int number = static_cast<int>(&patch - law_.patches.data() + std::ssize(law_.patches));
     gather_around(number, patch, [](int) {});
     int triangles = 0;
     gather_triangles(number, patch, [&](int t) {

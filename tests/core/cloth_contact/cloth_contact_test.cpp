@@ -138,7 +138,7 @@ TEST(ClothContact, ASheetComesToLieOnAnotherAtItsThickness) {
 // Bit for bit, with the solvers that vectors have and with plain ones.
 TEST(ClothContact, MissesNoPairThatAPlainSearchOfAllInEverySubstepFinds) {
   for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
-    for (const unsigned seed : {1, 10}) {
+    for (const unsigned seed : {1U, 10U}) {
       SCOPED_TRACE(seed);
       Scene listed = collision(precision, seed);
       listed.solver.frame_step = 0.005;

@@ -9,6 +9,7 @@
 
 #include "core/lattice/contact.h"
 #include "core/lattice/law.h"
+#include "core/motion/gaps.h"
 #include "core/motion/saved_values.h"
 
 namespace weft {
@@ -25,7 +26,7 @@ class LatticeSolver : public SheetSolver {
         damping_(sheet.textile.damping.value_or(kDefaultDamping)),
         law_(make_sweep_law<T>(sheet)),
         state_(law_.layout, compensated),
-        gap_(static_cast<std::size_t>(law_.layout.rows)) {
+        gaps_(static_cast<std::size_t>(law_.layout.rows)) {
     law_.compensated = compensated;
     if (wind) law_.wind = make_wind_law<T>(*wind);
   }
@@ -49,8 +50,8 @@ class LatticeSolver : public SheetSolver {
         at[State::kW + axis] = static_cast<T>(v(axis, i) * 2 * dt);
       at[State::kStep2] = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
     });
-    std::fill(gap_.begin(), gap_.end(), 0);
-    least_gap_ = come_ = pushed_ = 0;
+    gaps_.forget();
+    pushed_ = 0;
   }
 
   void advance(double time, ThreadPool& pool) override {
@@ -74,48 +75,29 @@ class LatticeSolver : public SheetSolver {
     for (int axis = 0; axis < 3; ++axis)
       at[State::kW + axis] = static_cast<T>(3 * d[axis]) - at[State::kD + axis];
     set_displacement(at, d);
-    moved_ = std::max(moved_, d.norm());
+    if (measures_) moved_ = std::max(moved_, d.norm());
   }
 
-  // A row is looked at again when it, or a collider, may have come as far as its gap was wide.
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
-    pushed_ = 0;
-    constexpr double kRounding = 1.001;
-    come_ += kRounding * (moved_ + contacts.reach());
-    if (come_ < least_gap_) return;
-    near_.clear();
-    for (int r = 0; r < law_.layout.rows; ++r)
-      if ((gap_[static_cast<std::size_t>(r)] -= come_) <= 0) near_.push_back(r);
-    come_ = 0;
-
     const bool in_parts = contacts.may_cross(moved_);
-    const int count = static_cast<int>(near_.size());
-    const int parts = std::clamp(count, 1, bands(pool));
-    std::vector<double> pushed(static_cast<std::size_t>(parts));
-    const auto resolve_part = [&](int part) {
-      std::vector<Vector3d> before;
-      for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-        const int r = near_[static_cast<std::size_t>(i)];
-        if (measures_) copy_row(r, before);
-        gap_[static_cast<std::size_t>(r)] =
-            in_parts ? resolve_in_parts(contacts, r)
-                     : resolve_row(contacts, origin_, law_.compensated, r, state_);
-        if (measures_) {
-          double& most = pushed[static_cast<std::size_t>(part)];
-          most = std::max(most, farthest_from(before, r));
-        }
-      }
-    };
-    if (parts == 1)
-      resolve_part(0);
-    else
-      pool.run(parts, resolve_part);
-    least_gap_ = *std::min_element(gap_.begin(), gap_.end());
-    pushed_ = *std::max_element(pushed.begin(), pushed.end());
+    gaps_.look(moved_ + contacts.reach(), bands(pool), pool, [&](int row) {
+      const std::vector<Vector3d> before = measures_ ? positions_in(row) : std::vector<Vector3d>();
+      const double gap = in_parts ? resolve_in_parts(contacts, row)
+                                  : resolve_row(contacts, origin_, law_.compensated, row, state_);
+      if (measures_) pushes_[static_cast<std::size_t>(row)] = farthest_from(before, row);
+      return gap;
+    });
+    pushed_ = 0;
+    if (measures_)
+      for (const int row : gaps_.looked_at())
+        pushed_ = std::max(pushed_, pushes_[static_cast<std::size_t>(row)]);
   }
 
-  void measure() override { law_.measured = measures_ = true; }
+  void measure() override {
+    law_.measured = measures_ = true;
+    pushes_.resize(gaps_.parts());
+  }
   double moved() const override { return moved_; }
   double pushed() const override { return pushed_; }
   void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
@@ -176,8 +158,7 @@ class LatticeSolver : public SheetSolver {
     saved.put(kind());
     saved.put(origin_.data(), 3);
     saved.put(law_.measured ? 1 : 0);
-    saved.put(come_);
-    saved.put(gap_.data(), gap_.size());
+    gaps_.save(saved);
     for (int plane = 0; plane < state_.planes(); ++plane)
       for_each_particle([&](int, ConstPlace at) { saved.put(at[plane]); });
     return saved.bytes();
@@ -190,9 +171,7 @@ class LatticeSolver : public SheetSolver {
     loaded.take(origin_.data(), 3);
     loaded.take(&measured, 1);
     law_.measured = measured != 0;
-    loaded.take(&come_, 1);
-    loaded.take(gap_.data(), gap_.size());
-    least_gap_ = *std::min_element(gap_.begin(), gap_.end());
+    gaps_.load(loaded);
     for (int plane = 0; plane < state_.planes(); ++plane)
       for_each_particle([&](int, Place at) { loaded.take(&at[plane], 1); });
     return loaded.all_taken();
@@ -270,9 +249,10 @@ class LatticeSolver : public SheetSolver {
     return nearest;
   }
 
-  void copy_row(int row, std::vector<Vector3d>& x) {
-    x.clear();
+  std::vector<Vector3d> positions_in(int row) {
+    std::vector<Vector3d> x;
     for (int c = 0; c < columns_; ++c) x.push_back(position(state_.place(row, c)));
+    return x;
   }
   double farthest_from(const std::vector<Vector3d>& before, int row) {
     double squared = 0;
@@ -300,10 +280,8 @@ class LatticeSolver : public SheetSolver {
   double moved_ = 0;                    // farthest displacement of the last step, m
   double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
   bool measures_ = false;               // pushed_
-  std::vector<double> gap_;             // of each row to the nearest skin, at least, m
-  double least_gap_ = 0;                // of all rows
-  double come_ = 0;                     // how far sheet and colliders may have come since, m
-  std::vector<int> near_;               // rows that may touch, in this step
+  std::vector<double> pushes_;          // the same of each row when last looked at, m
+  Gaps gaps_;                           // of rows
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/motion/gaps.h"
 #include "core/motion/saved_values.h"
 #include "core/triangles/contact.h"
 #include "core/triangles/law.h"
@@ -24,7 +25,7 @@ class TriangleSolver : public SheetSolver {
         particles_(static_cast<int>(mesh.mass.size())),
         law_(std::move(law)),
         state_(particles_, compensated),
-        gap_(static_cast<std::size_t>(law_.blocks())) {
+        gaps_(static_cast<std::size_t>(law_.blocks())) {
     law_.compensated = compensated;
     law_.drags = dynamics.drag.size() > 0;
     if (wind) law_.wind = make_wind_law<T>(*wind);
@@ -47,8 +48,8 @@ class TriangleSolver : public SheetSolver {
       set(state_.d, state_.d_error, i, v.col(i) * dt - a.col(i) * (dt * dt / 2));
       put(state_.w, i, v.col(i) * (2 * dt));
     }
-    std::fill(gap_.begin(), gap_.end(), 0);
-    least_gap_ = come_ = pushed_ = 0;
+    gaps_.forget();
+    pushed_ = 0;
   }
 
   void advance(double time, ThreadPool& pool) override {
@@ -71,48 +72,31 @@ class TriangleSolver : public SheetSolver {
       state_.w.data()[at + axis] =
           static_cast<T>(3 * d[static_cast<Eigen::Index>(axis)]) - state_.d.data()[at + axis];
     set(state_.d, state_.d_error, particle, d);
-    moved_ = std::max(moved_, d.norm());
+    if (measures_) moved_ = std::max(moved_, d.norm());
   }
 
-  // A block is looked at again when it, or a collider, may have come as far as its gap was wide.
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
-    pushed_ = 0;
-    constexpr double kRounding = 1.001;
-    come_ += kRounding * (moved_ + contacts.reach());
-    if (come_ < least_gap_) return;
-    near_.clear();
-    for (std::size_t b = 0; b < gap_.size(); ++b)
-      if ((gap_[b] -= come_) <= 0) near_.push_back(static_cast<int>(b));
-    come_ = 0;
-
     const bool in_parts = contacts.may_cross(moved_);
-    const int count = static_cast<int>(near_.size());
-    const int parts = std::clamp(count, 1, bands(pool));
-    std::vector<double> pushed(static_cast<std::size_t>(parts));
-    const auto resolve_part = [&](int part) {
-      std::vector<Vector3d> before;
-      for (int i = count * part / parts; i < count * (part + 1) / parts; ++i) {
-        const int b = near_[static_cast<std::size_t>(i)];
-        if (measures_) copy_block(b, before);
-        gap_[static_cast<std::size_t>(b)] =
-            in_parts ? resolve_in_parts(contacts, b)
-                     : resolve_block(contacts, origin_, law_.compensated, b, state_);
-        if (measures_) {
-          double& most = pushed[static_cast<std::size_t>(part)];
-          most = std::max(most, farthest_from(before, b));
-        }
-      }
-    };
-    if (parts == 1)
-      resolve_part(0);
-    else
-      pool.run(parts, resolve_part);
-    least_gap_ = *std::min_element(gap_.begin(), gap_.end());
-    pushed_ = *std::max_element(pushed.begin(), pushed.end());
+    gaps_.look(moved_ + contacts.reach(), bands(pool), pool, [&](int block) {
+      const std::vector<Vector3d> before =
+          measures_ ? positions_in(block) : std::vector<Vector3d>();
+      const double gap = in_parts
+                             ? resolve_in_parts(contacts, block)
+                             : resolve_block(contacts, origin_, law_.compensated, block, state_);
+      if (measures_) pushes_[static_cast<std::size_t>(block)] = farthest_from(before, block);
+      return gap;
+    });
+    pushed_ = 0;
+    if (measures_)
+      for (const int block : gaps_.looked_at())
+        pushed_ = std::max(pushed_, pushes_[static_cast<std::size_t>(block)]);
   }
 
-  void measure() override { law_.measured = measures_ = true; }
+  void measure() override {
+    law_.measured = measures_ = true;
+    pushes_.resize(gaps_.parts());
+  }
   double moved() const override { return moved_; }
   double pushed() const override { return pushed_; }
   void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
@@ -179,8 +163,7 @@ class TriangleSolver : public SheetSolver {
     saved.put(kind());
     saved.put(origin_.data(), 3);
     saved.put(law_.measured ? 1 : 0);
-    saved.put(come_);
-    saved.put(gap_.data(), gap_.size());
+    gaps_.save(saved);
     for (const AlignedArray<T>* plane : {&state_.x, &state_.w, &state_.d, &state_.step2,
                                          &state_.drag, &state_.x_error, &state_.d_error})
       saved.put(plane->data(), plane->size());
@@ -194,9 +177,7 @@ class TriangleSolver : public SheetSolver {
     loaded.take(origin_.data(), 3);
     loaded.take(&measured, 1);
     law_.measured = measured != 0;
-    loaded.take(&come_, 1);
-    loaded.take(gap_.data(), gap_.size());
-    least_gap_ = *std::min_element(gap_.begin(), gap_.end());
+    gaps_.load(loaded);
     for (AlignedArray<T>* plane : {&state_.x, &state_.w, &state_.d, &state_.step2, &state_.drag,
                                    &state_.x_error, &state_.d_error})
       loaded.take(plane->data(), plane->size());
@@ -279,12 +260,12 @@ class TriangleSolver : public SheetSolver {
     return nearest;
   }
 
-  // Positions of a block's particles.
-  void copy_block(int block, std::vector<Vector3d>& x) const {
-    x.clear();
+  std::vector<Vector3d> positions_in(int block) const {
+    std::vector<Vector3d> x;
     const std::size_t begin = static_cast<std::size_t>(block) * 4 * TriangleLaw<T>::kBlock;
     for (std::size_t k = 0; k < TriangleLaw<T>::kBlock; ++k)
       x.push_back(position_at(begin + 4 * k));
+    return x;
   }
   double farthest_from(const std::vector<Vector3d>& before, int block) const {
     const std::size_t begin = static_cast<std::size_t>(block) * 4 * TriangleLaw<T>::kBlock;
@@ -303,12 +284,10 @@ class TriangleSolver : public SheetSolver {
   bool started_ = false;
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
   double moved_ = 0;                    // farthest displacement of the last step, at most, m
-  std::vector<double> gap_;             // of each block to the nearest skin, at least, m
-  double least_gap_ = 0;                // of all blocks
+  Gaps gaps_;                           // of blocks
   double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
   bool measures_ = false;               // pushed_
-  double come_ = 0;                     // how far sheet and colliders may have come since, m
-  std::vector<int> near_;               // blocks that may touch, in this step
+  std::vector<double> pushes_;          // the same of each block when last looked at, m
 };
 
 template <class T>

@@ -116,6 +116,8 @@ Cloth::Cloth(const std::vector<SheetDefinition>& sheets) {
     }
   }
 
+  thickest = *std::max_element(thickness.begin(), thickness.end());
+
   std::vector<bool> placed(static_cast<std::size_t>(particles()));
   std::vector<std::vector<int>> joined(placed.size());  // ends of edges, from their lower one
   for (const auto& triangle : triangles) {
@@ -136,6 +138,12 @@ Cloth::Cloth(const std::vector<SheetDefinition>& sheets) {
   }
   first_edge.push_back(static_cast<int>(edges.size()));
   first_corner.push_back(static_cast<int>(corners.size()));
+}
+
+Matrix3Xd Cloth::positions(const std::vector<Matrix3Xd>& x) const {
+  Matrix3Xd all(3, particles());
+  for (std::size_t s = 0; s < x.size(); ++s) all.middleCols(first_particle[s], x[s].cols()) = x[s];
+  return all;
 }
 
 }  // namespace weft

@@ -18,10 +18,13 @@ struct Cloth {
   int own_number(int particle) const {
     return particle - first_particle[static_cast<std::size_t>(sheet_of(particle))];
   }
+  // Positions of all sheets, (3 x particles) m, of those of each.
+  Matrix3Xd positions(const std::vector<Matrix3Xd>& x) const;
 
   std::vector<int> first_particle;  // of each sheet; then how many there are
   std::vector<int> sheet;           // of each particle
   std::vector<double> thickness;    // of the sheet around each particle, m
+  double thickest = 0;              // of all, m
   std::vector<std::array<int, 3>> triangles;
   std::vector<std::array<Vector2d, 3>> flat;  // corners of each in the flat shape, m
   std::vector<std::array<int, 2>> edges;

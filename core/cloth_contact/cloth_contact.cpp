@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/cloth_contact/nearest.h"
+#include "core/contact/nearest.h"
 
 namespace weft {
 namespace {
@@ -19,7 +19,6 @@ constexpr double kDepthShare = 0.1;        // of its depth that a pair is moved 
 
 ClothContact::ClothContact(const Scene& scene)
     : scene_(scene), cloth_(scene.sheets), lists_(cloth_) {
-  thickest_ = *std::max_element(cloth_.thickness.begin(), cloth_.thickness.end());
   every_.resize(static_cast<std::size_t>(cloth_.particles()));
   std::iota(every_.begin(), every_.end(), 0);
   place_.assign(static_cast<std::size_t>(cloth_.particles()), -1);
@@ -42,7 +41,7 @@ void ClothContact::resolve(std::span<MovingSheet> sheets) {
   }
   // pairs act from as far as they may come in this step; faster than their own thickness they may
   // pass unseen
-  const double margin = std::min(2 * moved, thickest_);
+  const double margin = std::min(2 * moved, cloth_.thickest);
   const double relative = 2 * (moved_before_ + pushed + corrected_);
   corrected_ = 0;
   listed_.used += relative;
@@ -96,7 +95,7 @@ void ClothContact::prune(std::span<MovingSheet> sheets, double margin) {
     return take(near);
   }
   read_begin(sheets);
-  pruned_ = {std::max(thickest_ / 4, kSpareReach * margin), 0};
+  pruned_ = {std::max(cloth_.thickest / 4, kSpareReach * margin), 0};
   lists_.for_each_list([&](const ClothPairs& pairs) {
     ClothPairs& some_near = near.emplace_back();
     for (const ClothPair& pair : pairs.corners)
@@ -219,7 +218,7 @@ void ClothContact::separate() {
   for (int pass = 0; pass < kMostPasses; ++pass) {
     double most = 0;
     for (const Contact& contact : contacts_) most = std::max(most, separate(contact));
-    if (most <= kNoMorePasses * thickest_) break;
+    if (most <= kNoMorePasses * cloth_.thickest) break;
   }
 }
 

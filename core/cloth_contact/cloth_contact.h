@@ -71,7 +71,6 @@ class ClothContact {
   const Scene& scene_;
   Cloth cloth_;
   PairLists lists_;
-  double thickest_;  // m
   Slack listed_, pruned_;
   // farthest that a particle came by the last step, and that it was moved then, m
   double moved_before_ = 0, corrected_ = 0;

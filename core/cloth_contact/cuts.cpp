@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <tuple>
 
-#include "core/cloth_contact/near_blocks.h"
 #include "core/cloth_contact/orientation.h"
 
 namespace weft {
@@ -11,10 +10,14 @@ namespace weft {
 ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vector<Matrix3Xd>& x,
                      std::size_t most_told) {
   const Cloth cloth(sheets);
-  Matrix3Xd all(3, cloth.particles());
-  for (std::size_t s = 0; s < sheets.size(); ++s)
-    all.middleCols(cloth.first_particle[s], x[s].cols()) = x[s];
+  const Matrix3Xd all = cloth.positions(x);
+  NearBlocks near(cloth);
+  near.set(all);
+  return count_cuts(cloth, near, all, most_told);
+}
 
+ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& all,
+                     std::size_t most_told) {
   std::vector<ClothCut> found;
   const auto look = [&](int edges_of, int triangle) {
     const auto& [a, b, c] = cloth.triangles[static_cast<std::size_t>(triangle)];
@@ -29,8 +32,6 @@ ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vect
                        {cloth.own_number(a), cloth.own_number(b), cloth.own_number(c)}});
     }
   };
-  NearBlocks near(cloth);
-  near.set(all);
   for (const BlockPair& blocks : near.meet(0)) {
     if (near.distance(blocks) > 0) continue;
     near.for_each_near(blocks, 0, [&](int one, int other) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/cloth_contact/near_blocks.h"
 #include "core/model/mesh.h"
 
 namespace weft {
@@ -18,13 +19,16 @@ struct ClothCut {
 // Where sheets pass through themselves and each other.
 struct ClothCuts {
   std::int64_t count = 0;
-  std::vector<ClothCut>
-      first;  // in the order of sheets and particles, at most so many as asked for
+  // in the order of sheets and particles, at most so many as asked for
+  std::vector<ClothCut> first;
 };
 
 // Counts them exactly (orientation.h), without edges that share a particle with the triangle.
 // x: positions of each sheet, (3 x particles) m.
 ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vector<Matrix3Xd>& x,
                      std::size_t most_told = 10);
+// The same of cloth at x, where its blocks are.
+ClothCuts count_cuts(const Cloth& cloth, NearBlocks& blocks, const Matrix3Xd& x,
+                     std::size_t most_told);
 
 }  // namespace weft

@@ -5,10 +5,7 @@
 
 namespace weft {
 
-PairLists::PairLists(const Cloth& cloth)
-    : cloth_(cloth),
-      thickest_(*std::max_element(cloth.thickness.begin(), cloth.thickness.end())),
-      blocks_(cloth) {}
+PairLists::PairLists(const Cloth& cloth) : cloth_(cloth), blocks_(cloth) {}
 
 void PairLists::forget() {
   before_ = {};
@@ -18,7 +15,8 @@ void PairLists::forget() {
 
 void PairLists::update(const Matrix3Xd& x, double margin) {
   // lists of flat cloth stay empty: what shares no particle there is 2.8 thicknesses apart
-  const double reach = std::max(1.6 * thickest_, 2 * margin), least = std::max(0.6 * reach, margin);
+  const double reach = std::max(1.6 * cloth_.thickest, 2 * margin),
+               least = std::max(0.6 * reach, margin);
   blocks_.set(x);
   if (before_.cols() > 0) {
     // what a block moves by lies in a box, and what two move in relation to each other in both
@@ -50,7 +48,7 @@ void PairLists::update(const Matrix3Xd& x, double margin) {
 void PairLists::meet(double reach) {
   std::vector<List> old = std::exchange(lists_, {});
   auto known = old.begin();
-  for (const BlockPair& blocks : blocks_.meet(thickest_ + reach)) {
+  for (const BlockPair& blocks : blocks_.meet(cloth_.thickest + reach)) {
     while (known != old.end() && known->blocks < blocks) ++known;
     if (known != old.end() && known->blocks == blocks)
       lists_.push_back(std::move(*known));
@@ -62,7 +60,7 @@ void PairLists::meet(double reach) {
 
 void PairLists::remake(const Matrix3Xd& x, double reach, List& list) {
   list.pairs = {};
-  list.left = blocks_.distance(list.blocks) - thickest_;
+  list.left = blocks_.distance(list.blocks) - cloth_.thickest;
   if (list.left >= reach) return;
   list.left = reach;
   list.pairs = find_pairs(cloth_, blocks_, list.blocks, x, reach);

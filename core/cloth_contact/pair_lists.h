@@ -40,7 +40,6 @@ class PairLists {
   void remake(const Matrix3Xd& x, double reach, List& list);
 
   const Cloth& cloth_;
-  double thickest_;  // m
   NearBlocks blocks_;
   Matrix3Xd before_;                     // positions at the last update, m; or empty
   double met_left_ = -1;                 // of the reach that blocks were met with, m

@@ -4,7 +4,7 @@
 #include <map>
 #include <utility>
 
-#include "core/cloth_contact/nearest.h"
+#include "core/contact/nearest.h"
 
 namespace weft {
 namespace {
@@ -125,8 +125,7 @@ ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blo
         if (!share_end(ends_of(cloth, e), ends_of(cloth, f)) && near_edges(cloth, x, e, f, reach))
           found.edges.push_back({std::min(e, f), std::max(e, f)});
   };
-  const double thickest = *std::max_element(cloth.thickness.begin(), cloth.thickness.end());
-  near.for_each_near(blocks, thickest + reach, [&](int one, int other) {
+  near.for_each_near(blocks, cloth.thickest + reach, [&](int one, int other) {
     corners(one, other);
     corners(other, one);
     edges(one, other);

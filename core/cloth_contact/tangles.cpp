@@ -44,21 +44,18 @@ std::string describe_near(const Scene& scene, const Cloth& cloth, const ClothPai
 
 std::optional<Warning> find_tangles(const Scene& scene, const std::vector<Matrix3Xd>& x) {
   const Cloth cloth(scene.sheets);
-  Matrix3Xd all(3, cloth.particles());
-  for (std::size_t s = 0; s < x.size(); ++s)
-    all.middleCols(cloth.first_particle[s], x[s].cols()) = x[s];
+  const Matrix3Xd all = cloth.positions(x);
   NearBlocks blocks(cloth);
   blocks.set(all);
   constexpr double kRounding = 1e-9;  // m
-  const double thickest = *std::max_element(cloth.thickness.begin(), cloth.thickness.end());
   ClothPairs near;
-  for (const BlockPair& each : blocks.meet(thickest)) {
-    if (blocks.distance(each) > thickest) continue;
+  for (const BlockPair& each : blocks.meet(cloth.thickest)) {
+    if (blocks.distance(each) > cloth.thickest) continue;
     const ClothPairs found = find_pairs(cloth, blocks, each, all, -kRounding);
     near.corners.insert(near.corners.end(), found.corners.begin(), found.corners.end());
     near.edges.insert(near.edges.end(), found.edges.begin(), found.edges.end());
   }
-  const ClothCuts cuts = count_cuts(scene.sheets, x, kMostTold);
+  const ClothCuts cuts = count_cuts(cloth, blocks, all, kMostTold);
   if (near.empty() && cuts.count == 0) return std::nullopt;
   std::string text;
   if (cuts.count > 0) text += describe_cuts(scene, cuts) + ". What has passed through stays so. ";

@@ -4,18 +4,13 @@
 #include <array>
 #include <numeric>
 
+#include "core/contact/nearest.h"
+
 namespace weft {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
 constexpr std::size_t kDeepest = 64;  // halving leaves no more levels
-
-double squared_from_edge(const Vector3d& a, const Vector3d& b, const Vector3d& point) {
-  const Vector3d edge = b - a, away = point - a;
-  const double length = edge.squaredNorm();
-  const double share = length > 0 ? std::clamp(away.dot(edge) / length, 0.0, 1.0) : 0;
-  return (away - share * edge).squaredNorm();
-}
 
 // Whether a ray passes through a box nearer than `most`.
 bool meets(const Eigen::AlignedBox3d& box, const Vector3d& start, const Vector3d& inverse,
@@ -64,21 +59,8 @@ void TriangleTree::build(int first, int last, const std::vector<Vector3d>& middl
 
 double TriangleTree::squared_distance(int triangle, const Vector3d& point) const {
   const Vector3d &a = corner(triangle, 0), &b = corner(triangle, 1), &c = corner(triangle, 2);
-  const Vector3d ab = b - a, bc = c - b, ca = a - c, normal = ca.cross(ab);
-  // the nearest point lies on an edge that the point is beyond, or above the triangle
-  const bool beyond_ab = normal.cross(ab).dot(point - a) < 0;
-  const bool beyond_bc = normal.cross(bc).dot(point - b) < 0;
-  const bool beyond_ca = normal.cross(ca).dot(point - c) < 0;
-  const double squared = normal.squaredNorm();
-  if (!beyond_ab && !beyond_bc && !beyond_ca && squared > 0) {
-    const double height = normal.dot(point - a);
-    return height * height / squared;
-  }
-  double least = squared > 0 ? kNone : squared_from_edge(a, b, point);
-  if (beyond_ab) least = std::min(least, squared_from_edge(a, b, point));
-  if (beyond_bc || squared == 0) least = std::min(least, squared_from_edge(b, c, point));
-  if (beyond_ca || squared == 0) least = std::min(least, squared_from_edge(c, a, point));
-  return least;
+  const auto [u, v, w] = nearest_in_triangle(point, a, b, c);
+  return (u * a + v * b + w * c - point).squaredNorm();
 }
 
 TriangleTree::Nearest TriangleTree::nearest(const Vector3d& point, int guess) const {

@@ -52,8 +52,9 @@ struct TriangleLaw {
   std::vector<int> place;  // of each particle of the sheet: which it is in memory
   int blocks() const { return (particles + kBlock - 1) / kBlock; }
 
-  // Blocks that are stepped together, out of a copy of their particles and of those around them,
-  // small enough for the first cache. A triangle between two patches is in both.
+  // Blocks that are stepped together, out of a copy of their particles and of those around them
+  // that stays in a core's own caches; half and twice as many are as fast. A triangle between two
+  // patches is in both.
   struct Patch {
     int block = 0, blocks = 0;
     std::size_t around = 0, around_count = 0, beside_count = 0, group = 0, group_count = 0;
@@ -94,8 +95,5 @@ struct TriangleLaw {
 // have too many neighbours for a patch, some thousands.
 template <class T>
 std::optional<TriangleLaw<T>> make_triangle_law(const Mesh& mesh, bool blows);
-
-// Particles in an order that keeps neighbours near.
-std::vector<int> near_order(const std::vector<std::vector<int>>& neighbours);
 
 }  // namespace weft

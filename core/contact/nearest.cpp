@@ -1,4 +1,4 @@
-#include "core/cloth_contact/nearest.h"
+#include "core/contact/nearest.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -9,40 +9,16 @@
 #include <numeric>
 #include <utility>
 
+#include "core/triangles/bending_rows.h"
+#include "core/triangles/lists.h"
+#include "core/triangles/near_order.h"
+
 namespace weft {
 namespace {
 
 using Triangle = std::array<int, 3>;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
-// Lists of what each particle has, one after the other.
-template <class A>
-class Lists {
- public:
-  // Calls each(add) twice, with add(i, value).
-  template <class F>
-  Lists(int particles, const F& each) : first_(index(particles) + 1) {
-    each([&](int i, const A&) { ++first_[index(i) + 1]; });
-    for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-    all_.resize(first_.back());
-    std::vector<std::size_t> next(first_.begin(), first_.end() - 1);
-    each([&](int i, const A& value) { all_[next[index(i)]++] = value; });
-  }
-  struct List {
-    const A *first, *last;
-    const A* begin() const { return first; }
-    const A* end() const { return last; }
-    std::size_t size() const { return static_cast<std::size_t>(last - first); }
-  };
-  List at(int i) const {
-    return {all_.data() + first_[index(i)], all_.data() + first_[index(i) + 1]};
-  }
-
- private:
-  std::vector<std::size_t> first_;
-  std::vector<A> all_;
-};
 
 // Edge `edge` of a triangle, opposite to its corner of that number, leads to a particle.
 struct Spoke {
@@ -77,63 +53,6 @@ std::vector<std::vector<int>> neighbours_of(int particles, const Spokes& spokes,
   }
   return near;
 }
-
-// Rows of the matrix of the bending energy: N/m by particle, without the diagonal, for rows sum up
-// to 0.
-class BendingRows {
- public:
-  BendingRows(const Surface& surface, int particles)
-      : surface_(surface),
-        uses_(particles,
-              [&](const auto& add) {
-                for (std::size_t f = 0; f < surface.fits.size(); ++f)
-                  for (std::size_t k = 0; k < surface.fits[f].particle.size(); ++k)
-                    add(surface.fits[f].particle[k], Use{f, k});
-              }),
-        sum_(index(particles)),
-        known_(index(particles), -1) {}
-
-  struct Entry {
-    int particle;
-    double stiffness;
-  };
-  // Of particle i, by particle.
-  const std::vector<Entry>& row(int i) {
-    entries_.clear();
-    for (const auto& [f, at] : uses_.at(i)) {
-      const CurvatureFit& fit = surface_.fits[f];
-      const BendStiffness& bend = surface_.bend[index(fit.panel)];
-      const auto& own = fit.weight[at];
-      for (std::size_t k = 0; k < fit.particle.size(); ++k) {
-        const int j = fit.particle[k];
-        const auto& other = fit.weight[k];
-        if (j == i) continue;
-        if (known_[index(j)] != i) {
-          known_[index(j)] = i;
-          sum_[index(j)] = 0;
-          entries_.push_back({j, 0});
-        }
-        sum_[index(j)] +=
-            fit.area * (bend.warp * (own[0] * other[0]) + 2 * bend.twist * (own[1] * other[1]) +
-                        bend.weft * (own[2] * other[2]));
-      }
-    }
-    for (Entry& entry : entries_) entry.stiffness = sum_[index(entry.particle)];
-    std::sort(entries_.begin(), entries_.end(),
-              [](const Entry& a, const Entry& b) { return a.particle < b.particle; });
-    return entries_;
-  }
-
- private:
-  struct Use {
-    std::size_t fit, at;
-  };
-  const Surface& surface_;
-  Lists<Use> uses_;
-  std::vector<double> sum_;
-  std::vector<int> known_;
-  std::vector<Entry> entries_;
-};
 
 // The strains e_uu, e_vv and g of a triangle as sums of its l^2 - L^2, one a column, and its L^2.
 struct Measure {
@@ -187,54 +106,6 @@ void set_stiffness(const MembraneElement& element, const MembraneStiffness& stif
   }
   for (int k = 0; k < 3; ++k) put(12 + k, bend[k]);
 }
-
-// Halves a sheet across its length, again and again: what lies near is then near in memory.
-class Halving {
- public:
-  explicit Halving(const std::vector<std::vector<int>>& near)
-      : near_(near), part_(near.size()), order_(near.size()) {
-    std::iota(order_.begin(), order_.end(), 0);
-    halve(0, order_.size());
-  }
-  const std::vector<int>& order() const { return order_; }
-
- private:
-  void halve(std::size_t begin, std::size_t end) {
-    constexpr std::size_t kBlock = TriangleLaw<float>::kBlock;
-    constexpr std::size_t kPatch = kBlock * TriangleLaw<float>::kPatchBlocks;
-    if (end - begin <= kBlock) return;
-    // from one end, which is farthest from any particle, to the other
-    spread(begin, end);
-    std::swap(order_[begin], order_[end - 1]);
-    spread(begin, end);
-    const std::size_t unit = end - begin > kPatch ? kPatch : kBlock;
-    const std::size_t middle = begin + ((end - begin) / 2 + unit - 1) / unit * unit;
-    halve(begin, middle);
-    halve(middle, end);
-  }
-  // Orders a part by how many edges lead there from its first particle.
-  void spread(std::size_t begin, std::size_t end) {
-    const int mine = ++parts_, seen = ++parts_;
-    for (std::size_t k = begin; k < end; ++k) part_[index(order_[k])] = mine;
-    found_.clear();
-    for (std::size_t k = begin; k < end; ++k) {
-      visit(order_[k], mine, seen);
-      for (std::size_t at = found_.size() - 1; at < found_.size(); ++at)
-        for (const int j : near_[index(found_[at])]) visit(j, mine, seen);
-      if (found_.size() == end - begin) break;
-    }
-    std::copy(found_.begin(), found_.end(), order_.begin() + static_cast<std::ptrdiff_t>(begin));
-  }
-  void visit(int i, int mine, int seen) {
-    if (part_[index(i)] != mine) return;
-    part_[index(i)] = seen;
-    found_.push_back(i);
-  }
-
-  const std::vector<std::vector<int>>& near_;
-  std::vector<int> part_, order_, found_;
-  int parts_ = 0;
-};
 
 // Places within a patch.
 class Nearby {
@@ -520,10 +391,6 @@ class Packing {
 };
 
 }  // namespace
-
-std::vector<int> near_order(const std::vector<std::vector<int>>& neighbours) {
-  return Halving(neighbours).order();
-}
 
 template <class T>
 std::optional<TriangleLaw<T>> make_triangle_law(const Mesh& mesh, bool blows) {

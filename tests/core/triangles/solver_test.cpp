@@ -10,7 +10,7 @@
 #include <random>
 
 #include "core/simulation.h"
-#include "core/triangles/law.h"
+#include "core/triangles/near_order.h"
 #include "core/triangles/triangles.h"
 #include "tests/support/core/scenes.h"
 #include "tests/support/core/triangle_meshes.h"

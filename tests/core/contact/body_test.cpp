@@ -206,23 +206,10 @@ TEST(Bodies, OfABallsTrianglesCarryASheetWithinAFifthOfAMillimetreOfTheBall) {
   EXPECT_GT(resting, 50);
 }
 
-// As in the tests of the plane: particles that are blocks of the textbook.
 double slide_down(double angle, double friction, double seconds) {
-  SheetDefinition sheet = flat_sheet(2, 2, 0.01);
-  sheet.textile = {RawTextile{.particle_mass = 1e-3}, 0, friction};
   const Quaterniond turn(Eigen::AngleAxisd(-angle, Vector3d::UnitZ()));
-  sheet.rotation = turn;
-  sheet.skin = 1e-3;
-  sheet.origin = turn * Vector3d(0.013, 0.101, 0.007);
-  Scene scene = floating(sheet);
-  scene.environment.gravity = {0, -9.8, 0};
-  scene.colliders = {solid(box_mesh({0.5, 0.1, 0.1}, turn), friction)};
-  scene.solver.substep = 1e-4;
-  scene.solver.frame_step = 0.01;
-  Simulation simulation(scene);
-  const Matrix3Xd start = positions(simulation);
-  while (simulation.time() < seconds - 1e-9) EXPECT_TRUE(simulation.advance_frame());
-  return (positions(simulation) - start).col(0).norm();
+  return slide_on(solid(box_mesh({0.5, 0.1, 0.1}, turn), friction), turn,
+                  Vector3d(0.013, 0.101, 0.007), seconds);
 }
 
 TEST(Bodies, OfTrianglesLetAPatchSlideFromHalfADegreeAboveTheFrictionAngle) {

@@ -253,23 +253,10 @@ TEST(Contact, OfARowInVectorsIsThatOfItsParticles) {
   expect_rows_like_particles<double>(all);
 }
 
-// A sheet without springs on an incline: each particle is a block of the textbook.
 double slide_on_incline(double angle, double friction, double seconds) {
-  SheetDefinition sheet = flat_sheet(2, 2, 0.01);
-  sheet.textile = {RawTextile{.particle_mass = 1e-3}, 0, friction};
   const Quaterniond turn(Eigen::AngleAxisd(-angle, Vector3d::UnitZ()));
-  sheet.rotation = turn;
-  sheet.skin = 1e-3;
-  sheet.origin = turn * Vector3d(0, 1e-3, 0);
-  Scene scene = floating(sheet);
-  scene.environment.gravity = {0, -9.8, 0};
-  scene.colliders = {body(Plane{Vector3d::Zero(), turn * Vector3d::UnitY()}, friction)};
-  scene.solver.substep = 1e-4;
-  scene.solver.frame_step = 0.01;
-  Simulation simulation(scene);
-  const Matrix3Xd start = positions(simulation);
-  while (simulation.time() < seconds - 1e-9) EXPECT_TRUE(simulation.advance_frame());
-  return (positions(simulation) - start).col(0).norm();
+  return slide_on(body(Plane{Vector3d::Zero(), turn * Vector3d::UnitY()}, friction), turn,
+                  Vector3d(0, 1e-3, 0), seconds);
 }
 
 TEST(Contact, ABlockOnAnInclineSticksBelowTheFrictionAngleAndSlidesAboveItAsCoulombSays) {

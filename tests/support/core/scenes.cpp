@@ -1,6 +1,7 @@
 #include "tests/support/core/scenes.h"
 
 #include <bit>
+#include <limits>
 #include <random>
 
 namespace weft::testing {
@@ -71,6 +72,25 @@ std::vector<double> values(const Matrix3Xd& columns) {
 
 Matrix3Xd stretched(const SheetDefinition& sheet, double strain) {
   return start_positions(sheet) * (1 + strain);
+}
+
+double slide_on(const Collider& incline, const Quaterniond& turn, const Vector3d& start,
+                double seconds) {
+  SheetDefinition sheet = flat_sheet(2, 2, 0.01);
+  sheet.textile = {RawTextile{.particle_mass = 1e-3}, 0, incline.friction};
+  sheet.rotation = turn;
+  sheet.skin = 1e-3;
+  sheet.origin = turn * start;
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.colliders = {incline};
+  scene.solver.substep = 1e-4;
+  scene.solver.frame_step = 0.01;
+  Simulation simulation(scene);
+  const Matrix3Xd from = positions(simulation);
+  while (simulation.time() < seconds - 1e-9)
+    if (!simulation.advance_frame()) return std::numeric_limits<double>::quiet_NaN();
+  return (positions(simulation) - from).col(0).norm();
 }
 
 }  // namespace weft::testing

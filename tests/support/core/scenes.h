@@ -31,4 +31,10 @@ std::vector<double> values(const Matrix3Xd& columns);
 // Positions of a sheet stretched by `strain` in its plane.
 Matrix3Xd stretched(const SheetDefinition& sheet, double strain);
 
+// How far a sheet without springs comes down an incline that is turned so, m: each particle is a
+// block of the textbook, its friction that of the incline. start: of its corner, before the turn,
+// m.
+double slide_on(const Collider& incline, const Quaterniond& turn, const Vector3d& start,
+                double seconds);
+
 }  // namespace weft::testing

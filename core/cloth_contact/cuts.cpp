@@ -16,7 +16,7 @@ ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vect
   return count_cuts(cloth, near, all, most_told);
 }
 
-ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& all,
+ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
                      std::size_t most_told) {
   std::vector<ClothCut> found;
   const auto look = [&](int edges_of, int triangle) {
@@ -25,7 +25,7 @@ ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& all,
     for (int e = cloth.first_edge[from]; e < cloth.first_edge[from + 1]; ++e) {
       const auto& [p, q] = cloth.edges[static_cast<std::size_t>(e)];
       if (p == a || p == b || p == c || q == a || q == b || q == c) continue;
-      if (!cuts(all.col(p), all.col(q), all.col(a), all.col(b), all.col(c))) continue;
+      if (!cuts(x.col(p), x.col(q), x.col(a), x.col(b), x.col(c))) continue;
       found.push_back({static_cast<std::size_t>(cloth.sheet_of(p)),
                        static_cast<std::size_t>(cloth.sheet_of(a)),
                        {cloth.own_number(p), cloth.own_number(q)},

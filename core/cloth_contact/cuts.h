@@ -28,7 +28,7 @@ struct ClothCuts {
 ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vector<Matrix3Xd>& x,
                      std::size_t most_told = 10);
 // The same of cloth at x, where its blocks are.
-ClothCuts count_cuts(const Cloth& cloth, NearBlocks& blocks, const Matrix3Xd& x,
+ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
                      std::size_t most_told);
 
 }  // namespace weft

@@ -51,7 +51,7 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   const std::int64_t turn = std::max(1, kParticles / particle_count());
   const double begin = time(), dt = plan.step.substep;
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
-    step(begin + static_cast<double>(k) * dt, dt, pool);
+    step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
     ++k;
     if (enough && k % turn == 0 && k < plan.step.substeps && enough()) return false;
   }
@@ -59,7 +59,7 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
 }
 
 // One substep, from `time` to `time` + dt.
-void Simulation::State::step(double time, double dt, ThreadPool& pool) {
+void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool& pool) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     MovingSheet& sheet = sheets[s];
     const SheetDefinition& definition = scene.sheets[s];
@@ -68,7 +68,7 @@ void Simulation::State::step(double time, double dt, ThreadPool& pool) {
     sheet.solver->advance(time, pool);
     move_pins(definition.pins, time + dt, dt, sheet);
   }
-  if (cloth_contact) cloth_contact->resolve(sheets);
+  if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame);
 
   // colliders last, so that no particle ends a step inside one
   if (scene.colliders.empty()) return;
@@ -388,6 +388,7 @@ FrameStats Simulation::stats() const {
         elastic_energy(sheet.mesh, x) - sheet.mesh.mass.dot(x.transpose() * sheet.dynamics.gravity);
     stats.largest_strain = std::max(stats.largest_strain, largest_strain(sheet.mesh, x));
   }
+  if (state_->cloth_contact) stats.cloth_cuts = state_->cloth_contact->count_cuts(state_->sheets);
   return stats;
 }
 

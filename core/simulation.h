@@ -17,9 +17,10 @@
 namespace weft {
 
 struct FrameStats {
-  double kinetic_energy = 0;    // J
-  double potential_energy = 0;  // elastic + gravity, 0 at the origin, J
-  double largest_strain = 0;    // of the stretch connections
+  double kinetic_energy = 0;                    // J
+  double potential_energy = 0;                  // elastic + gravity, 0 at the origin, J
+  double largest_strain = 0;                    // of the stretch connections
+  std::optional<std::int64_t> cloth_cuts = {};  // of scenes with cloth contact
 };
 
 // What became of a frame that is computed in parts.

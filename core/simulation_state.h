@@ -63,7 +63,7 @@ struct Simulation::State {
   FramePart advance_frame(const Enough& enough, ThreadPool& pool);
   bool begin_frame(bool in_parts);
   bool take_substeps(const Enough& enough, ThreadPool& pool);
-  void step(double time, double dt, ThreadPool& pool);
+  void step(double time, double dt, bool ends_frame, ThreadPool& pool);
   Attempt inspect_sheets(NextStates& next);
   Decision repair(const Attempt& made, NextStates& next);
   void restart_from(NextStates& next);

@@ -4,87 +4,67 @@
 #include <vector>
 
 #include "core/cloth_contact/pair_lists.h"
+#include "core/cloth_contact/separation.h"
 #include "core/moving_sheet.h"
 
 namespace weft {
 
 // Keeps cloth from passing through cloth: particles from triangles and edges from edges, of one
-// sheet or of two, by what each pair gives to one and takes from the other.
+// sheet or of two (separation.h).
 //
-// A pair acts along the line between its nearest points at the begin of the step, while these were
-// still on their own sides. Inelastic: it takes away the approach that would bring the pair nearer
-// than its thickness, and friction by Coulomb as much of its sliding as that allows. Pairs that are
-// nearer all the same are moved apart without speed, some of the way in each step. Pairs follow one
-// another, in an order of their own, so what comes of them does not depend on who computes them.
+// Contact acts once in a window of several steps, in which nothing moves far in relation to
+// anything else; a window ends with its frame at the latest, so frames can be gone on from. What
+// may be near each other is listed where a window begins, so what comes of it does not depend on
+// lists, nor on who computes them.
 class ClothContact {
  public:
   // Holds on to the scene.
   explicit ClothContact(const Scene& scene);
 
-  // Sheets may be anywhere now, or be held otherwise. Nothing that was found before is used, nor
-  // kept in memory.
+  // Sheets may be anywhere now, or be held otherwise, at the begin of a frame. Nothing that was
+  // found before is used, nor kept in memory.
   void forget();
-  // Of sheets that have taken a step.
-  void resolve(std::span<MovingSheet> sheets);
+  // Of sheets that have taken a step of dt, s.
+  void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame);
+
+  // At the end of the last frame (cuts.h).
+  std::int64_t count_cuts(std::span<const MovingSheet> sheets);
 
  private:
-  // How near pairs are looked for beyond their thickness, m, and how much of it relative motion may
-  // have used up.
-  struct Slack {
-    double reach = -1, used = 0;
-    bool lasts(double margin) const { return used + margin <= reach; }
-  };
-  // A particle on its way through a step; fourth components are 0.
-  struct Mover {
-    Eigen::Vector4d in_step, way;  // displacement of the step, and where it led, m
-    double inverse_mass;           // 1/kg
-  };
-  // A pair that may act in this step. Weights lead from the second one's nearest point to the first
-  // one's; shares are what particles have of the pair's motion.
-  struct Contact {
-    std::array<int, 4> place;
-    std::array<double, 4> weight, share;
-    Eigen::Vector4d normal;
-    double distance, thickness, friction;  // m, m, 1
-  };
-  struct Candidate {
-    std::array<int, 4> place;
-    bool edges;
-    double thickness, friction;
+  // Steps after which contact acts once.
+  struct Window {
+    int steps = 0, most_steps = 1;
+    double reach = 0;  // of relative motion in it, m
   };
 
-  void list(std::span<MovingSheet> sheets, double margin);
-  void read_begin(std::span<MovingSheet> sheets);
-  void prune(std::span<MovingSheet> sheets, double margin);
-  void take(const std::vector<ClothPairs>& lists);
+  void begin_window(std::span<MovingSheet> sheets, double in_step);
+  void update_lists(std::span<MovingSheet> sheets, double margin, double in_step);
+  template <class Lists>
+  void take(const Lists& for_each_list);
   template <class F>
   void for_each_run(const F& f) const;
   void read(std::span<MovingSheet> sheets);
-  void touch(double margin);
-  void separate();
-  double separate(const Contact& contact);
-  Mover& mover(const Contact& contact, std::size_t n) {
-    return movers_[static_cast<std::size_t>(contact.place[n])];
-  }
+  void set_out();
   void write(std::span<MovingSheet> sheets);
 
   const Scene& scene_;
   Cloth cloth_;
   PairLists lists_;
-  Slack listed_, pruned_;
-  // farthest that a particle came by the last step, and that it was moved then, m
-  double moved_before_ = 0, corrected_ = 0;
+  Window window_;
+  // in relation to each other: since where the window began, and from the last update of the lists
+  // until there, m
+  double come_ = 0, moved_ = 0;
 
-  Matrix3Xd begin_;         // of the step when last looked at, (3 x particles) m
-  std::vector<int> every_;  // 0 ... particles - 1
-  std::vector<Candidate> candidates_;
-  std::vector<int> place_;       // of each particle among particles_, or -1
-  std::vector<int> particles_;   // that candidates have, ascending
-  std::vector<int> own_number_;  // in their sheets
-  Matrix3Xd x_, d_;              // of these at the begin of the step, and in it, m
+  Matrix3Xd all_, one_sheet_;  // positions of all particles, of those of a sheet, m
+  std::vector<ContactCandidate> candidates_;
+  std::vector<int> place_;            // of each particle among particles_, or -1
+  std::vector<int> particles_;        // that candidates have, ascending
+  std::vector<int> own_number_;       // in their sheets
+  std::vector<double> inverse_mass_;  // of these, 1/kg
+  Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m
+  Separation separation_;
   std::vector<Mover> movers_;
-  std::vector<int> moved_;  // of a sheet, by its own numbers
-  std::vector<Contact> contacts_;
+  std::vector<int> changed_;  // of a sheet, by its own numbers
 };
 
 }  // namespace weft

@@ -105,7 +105,7 @@ FlatPatches::FlatPatches(const Cloth& cloth) : cloth_(cloth) {
   }
   for (const auto& [ends, side] : sides)
     if (side.first != 2) borders_.push_back(side.second);
-  range_.resize(blocks);
+  gradients_.resize(blocks);
   known_.resize(blocks);
 }
 
@@ -119,19 +119,31 @@ double FlatPatches::distance(int one, int other) {
     return 0;
   const Patch& over = patch(one, other);
   if (!over.whole) return 0;
-  Range all = range(over.blocks.front());
-  for (const int block : over.blocks) {
-    const Range& each = range(block);
-    all.low = all.low.cwiseMin(each.low);
-    all.high = all.high.cwiseMax(each.high);
-  }
-  const Gradient middle = (all.low + all.high) / 2;
-  const double differs = (all.high - all.low).norm() / 2;
-  const Eigen::Matrix2d square = middle.transpose() * middle;
+  Gradient sum = Gradient::Zero();
+  for (const int block : over.blocks) sum += gradients(block).sum;
+  // seen along its mean normal
+  Gradient seen;
+  seen.col(0) = sum.col(0).normalized();
+  seen.col(1) = sum.col(0).cross(sum.col(1)).cross(sum.col(0)).normalized();
+  Eigen::Array4d low = Eigen::Array4d::Constant(std::numeric_limits<double>::infinity()),
+                 high = -low;
+  for (const int block : over.blocks)
+    for (const Gradient& each : gradients(block).each) {
+      const Eigen::Array4d plane(seen.col(0).dot(each.col(0)), seen.col(1).dot(each.col(0)),
+                                 seen.col(0).dot(each.col(1)), seen.col(1).dot(each.col(1)));
+      low = low.min(plane);
+      high = high.max(plane);
+    }
+  const Eigen::Array4d middle = (low + high) / 2;
+  const double differs = (high - low).matrix().norm() / 2;
+  Eigen::Matrix2d plane;
+  plane << middle[0], middle[2], middle[1], middle[3];
+  const Eigen::Matrix2d square = plane.transpose() * plane;
   const double least =
       square.trace() / 2 - std::hypot((square(0, 0) - square(1, 1)) / 2, square(0, 1));
   constexpr double kRounding = 1e-6;
-  return std::max(0.0, (std::sqrt(std::max(least, 0.0)) - differs - kRounding) * over.least_height);
+  const double factor = std::sqrt(std::max(least, 0.0)) - differs - kRounding;
+  return factor > 0 ? factor * over.least_height : 0;
 }
 
 // Over both blocks and what lies between them.
@@ -166,23 +178,22 @@ const FlatPatches::Patch& FlatPatches::patch(int one, int other) {
   return patch;
 }
 
-const FlatPatches::Range& FlatPatches::range(int block) {
+const FlatPatches::Gradients& FlatPatches::gradients(int block) {
   const auto b = static_cast<std::size_t>(block);
-  Range& range = range_[b];
-  if (known_[b]) return range;
+  Gradients& gradients = gradients_[b];
+  if (known_[b]) return gradients;
   known_[b] = true;
-  range.low.setConstant(std::numeric_limits<double>::infinity());
-  range.high = -range.low;
+  gradients.each.clear();
+  gradients.sum.setZero();
   for (int t = cloth_.first_block[b]; t < cloth_.first_block[b + 1]; ++t) {
     const auto at = static_cast<std::size_t>(t);
     const auto& [i, j, k] = cloth_.triangles[at];
     Gradient sides;
     sides << x_->col(j) - x_->col(i), x_->col(k) - x_->col(i);
-    const Gradient gradient = sides * inverse_[at];
-    range.low = range.low.cwiseMin(gradient);
-    range.high = range.high.cwiseMax(gradient);
+    gradients.each.emplace_back(sides * inverse_[at]);
+    gradients.sum += gradients.each.back();
   }
-  return range;
+  return gradients;
 }
 
 }  // namespace weft

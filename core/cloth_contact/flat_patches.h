@@ -10,10 +10,11 @@
 namespace weft {
 
 // Tells where cloth lies so flat that it cannot be near itself. Let x(u) be the sheet over its flat
-// shape, and H convex there and without border inside. If the gradients of all triangles over H
-// differ from one matrix F by less than e, then |x(u) - x(v)| >= (s - e) |u - v| for u and v in H,
-// s the smaller singular value of F: the way from u to v leads through these triangles alone. And
-// what shares no particle is no nearer to each other in H than triangles are high.
+// shape as seen along a line, and H convex there and without border inside. If the gradients of all
+// triangles over H differ from one matrix F by less than e, then |x(u) - x(v)| >= (s - e) |u - v|
+// for u and v in H, s the smaller singular value of F: the way from u to v leads through these
+// triangles alone. And what shares no particle is no nearer to each other in H than triangles are
+// high.
 class FlatPatches {
  public:
   explicit FlatPatches(const Cloth& cloth);
@@ -26,8 +27,9 @@ class FlatPatches {
 
  private:
   using Gradient = Eigen::Matrix<double, 3, 2>;
-  struct Range {
-    Gradient low, high;
+  struct Gradients {  // of the triangles of a block
+    std::vector<Gradient> each;
+    Gradient sum;
   };
   using Box = Eigen::AlignedBox2d;
   using Polygon = std::vector<Vector2d>;  // convex, anticlockwise
@@ -42,7 +44,7 @@ class FlatPatches {
   };
 
   const Patch& patch(int one, int other);
-  const Range& range(int block);
+  const Gradients& gradients(int block);
 
   const Cloth& cloth_;
   std::vector<Eigen::Matrix2d> inverse_;  // of each triangle's sides in the flat shape, 1/m
@@ -53,8 +55,8 @@ class FlatPatches {
   std::unordered_map<std::uint64_t, Patch> patches_;
 
   const Matrix3Xd* x_ = nullptr;
-  std::vector<Range> range_;  // of each block
-  std::vector<bool> known_;   // which of them are of x
+  std::vector<Gradients> gradients_;  // of each block
+  std::vector<bool> known_;           // which of them are of x
 };
 
 }  // namespace weft

@@ -1,6 +1,7 @@
 #include "core/cloth_contact/near_blocks.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace weft {
 
@@ -85,6 +86,25 @@ double NearBlocks::distance(const BlockPair& blocks) {
   const auto& [one, other] = blocks;
   const double between = gap(block_box(one), block_box(other));
   return between > 0 ? between : flat_.distance(one, other);
+}
+
+NearBlocks::Box NearBlocks::box_motion(const Matrix3Xd& from, const Matrix3Xd& to,
+                                       std::vector<Box>& motion) const {
+  Box all;
+  motion.resize(box_.size());
+  for (std::size_t b = 0; b < box_.size(); ++b) {
+    // by values that stay in registers
+    Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()),
+                   high = -low;
+    for (const int i : particles(static_cast<int>(b))) {
+      const Eigen::Array3d by = to.col(i).array() - from.col(i).array();
+      low = low.min(by);
+      high = high.max(by);
+    }
+    motion[b] = Box(low.matrix(), high.matrix());
+    all.extend(motion[b]);
+  }
+  return all;
 }
 
 void NearBlocks::box_triangles(std::size_t block) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <compare>
+#include <span>
 #include <vector>
 
 #include "core/cloth_contact/flat_patches.h"
@@ -41,13 +42,16 @@ class NearBlocks {
         if ((blocks.one != blocks.other || s < t) && gap(triangle_box(s), triangle_box(t)) <= reach)
           f(s, t);
   }
-  // Calls f(block, particle) for the particles of every block.
-  template <class F>
-  void for_each_particle(const F& f) const {
-    for (std::size_t b = 0; b < box_.size(); ++b)
-      for (int k = first_particle_[b]; k < first_particle_[b + 1]; ++k)
-        f(b, particles_[static_cast<std::size_t>(k)]);
+  // Of a block.
+  std::span<const int> particles(int block) const {
+    const auto b = static_cast<std::size_t>(block);
+    return std::span(particles_)
+        .subspan(static_cast<std::size_t>(first_particle_[b]),
+                 static_cast<std::size_t>(first_particle_[b + 1] - first_particle_[b]));
   }
+  // Around what the particles of each block moved by from one place to the other, m; returns that
+  // of all.
+  Box box_motion(const Matrix3Xd& from, const Matrix3Xd& to, std::vector<Box>& motion) const;
 
  private:
   // Blocks first ... last - 1; its halves are 2 number and 2 number + 1.

@@ -283,6 +283,20 @@ TEST(ClothContact, ASheetPouredIntoAHeapDoesNotPassThroughItself) {
   EXPECT_LT(positions(simulation).row(1).maxCoeff(), 0.1);
 }
 
+TEST(ClothContact, CutsOfAFrameAreAmongItsFacts) {
+  SheetDefinition one = triangles(0.1, 0.1), other = lattice(5, 5);
+  other.origin = {0.03, -0.02, 0.04};
+  other.rotation = Quaterniond(Eigen::AngleAxisd(-1.2, Vector3d::UnitX()));
+  Scene scene = touching({one, other});
+  const Simulation tangled(scene);
+  EXPECT_GT(tangled.stats().cloth_cuts, 0);
+  EXPECT_EQ(tangled.stats().cloth_cuts, cuts_now(tangled));
+  scene.sheets[1].origin.y() = 0.1;
+  EXPECT_EQ(Simulation(scene).stats().cloth_cuts, 0);
+  scene.cloth_contact = false;
+  EXPECT_EQ(Simulation(scene).stats().cloth_cuts, std::nullopt);
+}
+
 TEST(ClothContact, ThicknessIsBoundedByTheMesh) {
   Scene scene = touching({lattice(3, 3)});
   EXPECT_EQ(scene.sheets[0].thickness_or_default(), 2e-3);

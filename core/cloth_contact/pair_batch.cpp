@@ -1,0 +1,111 @@
+#include "core/cloth_contact/pair_batch.h"
+
+// compiled again for every target
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "core/cloth_contact/pair_batch.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "core/motion/vectors-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace weft::HWY_NAMESPACE {
+
+using PairTag = hn::CappedTag<double, PairBatch::kMost>;
+using Values = hn::Vec<PairTag>;
+using Point = Triple<Values>;
+
+HWY_INLINE Values of(double value) { return hn::Set(PairTag(), value); }
+HWY_INLINE Point load_point(const double (*planes)[PairBatch::kMost], std::size_t at) {
+  const PairTag d;
+  return {hn::Load(d, planes[0] + at), hn::Load(d, planes[1] + at), hn::Load(d, planes[2] + at)};
+}
+// a / b within 0 to 1; 0 where b is not above 0
+HWY_INLINE Values share(Values a, Values b) {
+  const auto some = hn::Gt(b, of(0));
+  const Values quotient = hn::Div(a, hn::IfThenElse(some, b, of(1)));
+  return hn::IfThenElseZero(some, hn::Min(hn::Max(quotient, of(0)), of(1)));
+}
+HWY_INLINE void put(const PairBatch::Planes& planes, std::size_t at, const Point& apart) {
+  const PairTag d;
+  hn::Store(apart.x, d, planes.apart[0] + at);
+  hn::Store(apart.y, d, planes.apart[1] + at);
+  hn::Store(apart.z, d, planes.apart[2] + at);
+  hn::Store(squared(apart), d, planes.squared + at);
+}
+
+void solve_corners(const PairBatch::Planes& planes) {
+  const PairTag d;
+  const Values zero = of(0), one = of(1);
+  for (std::size_t at = 0; at < planes.size; at += hn::Lanes(d)) {
+    const Point p = load_point(planes.points, at), a = load_point(planes.points + 3, at),
+                b = load_point(planes.points + 6, at), c = load_point(planes.points + 9, at);
+    const Point ab = minus(b, a), ac = minus(c, a), bc = minus(c, b), ap = minus(p, a),
+                bp = minus(p, b), normal = product(ab, ac);
+    const Values area = squared(normal);
+    const auto flat = hn::Gt(area, zero);
+    const Values inverse = hn::Div(one, hn::IfThenElse(flat, area, one));
+    const Values v = hn::Mul(dot(product(ap, ac), normal), inverse),
+                 w = hn::Mul(dot(product(ab, ap), normal), inverse),
+                 u = hn::Sub(hn::Sub(one, v), w);
+    const auto inside =
+        hn::And(hn::And(flat, hn::Ge(u, zero)), hn::And(hn::Ge(v, zero), hn::Ge(w, zero)));
+
+    const Values on_ab = share(dot(ap, ab), squared(ab)), on_ac = share(dot(ap, ac), squared(ac)),
+                 on_bc = share(dot(bp, bc), squared(bc));
+    const Values to_ab = squared(minus_times(ap, ab, on_ab)),
+                 to_ac = squared(minus_times(ap, ac, on_ac)),
+                 to_bc = squared(minus_times(bp, bc, on_bc));
+    const auto is_ab = hn::And(hn::Le(to_ab, to_ac), hn::Le(to_ab, to_bc)),
+               is_ac = hn::Le(to_ac, to_bc);
+    const Values edge_v =
+        hn::IfThenElse(is_ab, on_ab, hn::IfThenElse(is_ac, zero, hn::Sub(one, on_bc)));
+    const Values edge_w = hn::IfThenElse(is_ab, zero, hn::IfThenElse(is_ac, on_ac, on_bc));
+
+    const Values b_share = hn::IfThenElse(inside, v, edge_v),
+                 c_share = hn::IfThenElse(inside, w, edge_w);
+    hn::Store(one, d, planes.weights[0] + at);
+    hn::Store(hn::Sub(hn::Add(b_share, c_share), one), d, planes.weights[1] + at);
+    hn::Store(hn::Neg(b_share), d, planes.weights[2] + at);
+    hn::Store(hn::Neg(c_share), d, planes.weights[3] + at);
+    put(planes, at, minus_times(minus_times(ap, ab, b_share), ac, c_share));
+  }
+}
+
+void solve_edges(const PairBatch::Planes& planes) {
+  constexpr double kParallel = 1e-12;  // squared sine, where any share will do
+  const PairTag tag;
+  const Values one = of(1);
+  for (std::size_t at = 0; at < planes.size; at += hn::Lanes(tag)) {
+    const Point a = load_point(planes.points, at), b = load_point(planes.points + 3, at),
+                c = load_point(planes.points + 6, at), d = load_point(planes.points + 9, at);
+    const Point u = minus(b, a), v = minus(d, c), w = minus(a, c);
+    const Values uu = squared(u), uv = dot(u, v), vv = squared(v), uw = dot(u, w), vw = dot(v, w),
+                 both = hn::Mul(uu, vv), sine = hn::NegMulAdd(uv, uv, both);
+    const Values first =
+        hn::IfThenElse(hn::Gt(sine, hn::Mul(of(kParallel), both)),
+                       share(hn::NegMulAdd(vv, uw, hn::Mul(uv, vw)), sine), of(0.5));
+    const Values t = share(hn::MulAdd(first, uv, vw), vv);
+    const Values s = share(hn::NegMulAdd(one, uw, hn::Mul(t, uv)), uu);
+    hn::Store(hn::Sub(one, s), tag, planes.weights[0] + at);
+    hn::Store(s, tag, planes.weights[1] + at);
+    hn::Store(hn::Sub(t, one), tag, planes.weights[2] + at);
+    hn::Store(hn::Neg(t), tag, planes.weights[3] + at);
+    put(planes, at, minus_times(plus_times(w, u, s), v, t));
+  }
+}
+
+}  // namespace weft::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace weft {
+
+HWY_EXPORT(solve_corners);
+HWY_EXPORT(solve_edges);
+
+void PairBatch::solve_corners() { HWY_DYNAMIC_DISPATCH(solve_corners)(planes()); }
+void PairBatch::solve_edges() { HWY_DYNAMIC_DISPATCH(solve_edges)(planes()); }
+
+}  // namespace weft
+#endif

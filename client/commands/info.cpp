@@ -30,6 +30,11 @@ std::string numbers_text(const v1::FrameFormat& format) {
   }
 }
 
+std::string cuts_text(const Tally& tally) {
+  if (!tally.most_cuts) return "not counted: the scene has no cloth contact";
+  return *tally.most_cuts == 0 ? "none" : fmt::format("{} in a frame at most", *tally.most_cuts);
+}
+
 std::string facts_text(const RecordingReader& recording, const Inspection& inspection) {
   const v1::StreamHeader& header = recording.header();
   const Tally& tally = inspection.tally;
@@ -53,6 +58,7 @@ std::string facts_text(const RecordingReader& recording, const Inspection& inspe
              fmt::format("{:.6g} s to {:.6g} s", tally.first_time_s, tally.last_time_s))
         .add("largest strain", percent_text(tally.largest_strain))
         .add("repairs", tally.repairs == 0 ? "none" : std::to_string(tally.repairs))
+        .add("cuts of cloth", cuts_text(tally))
         .add("kinetic energy", number_text(tally.last_stats.kinetic_energy_j()) + " J at the end")
         .add("potential energy",
              number_text(tally.last_stats.potential_energy_j()) + " J at the end")
@@ -81,6 +87,7 @@ Json facts_json(const RecordingReader& recording, const Inspection& inspection) 
           {"last_time_s", tally.last_time_s},
           {"substeps", tally.substeps},
           {"largest_strain", tally.largest_strain},
+          {"most_cuts", tally.most_cuts ? Json(*tally.most_cuts) : Json()},
           {"last_stats", to_json(tally.last_stats)},
           {"faults", inspection.faults.size()}};
 }

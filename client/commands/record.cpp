@@ -37,6 +37,7 @@ void answer(Context& context, const RecordingOrder& order, const RecordingResult
                   {"substeps", tally.substeps},
                   {"largest_strain", tally.largest_strain},
                   {"repairs", tally.repairs},
+                  {"most_cuts", tally.most_cuts ? Json(*tally.most_cuts) : Json()},
                   {"at_rest", tally.last_stats.at_rest()},
                   {"reconnections", result.reconnections}};
   std::string text = fmt::format("{}: {}", order.path, count_of(tally.frames, "frame"));
@@ -47,6 +48,8 @@ void answer(Context& context, const RecordingOrder& order, const RecordingResult
                         percent_text(tally.largest_strain));
   }
   if (tally.repairs > 0) text += fmt::format(", {}", count_of(tally.repairs, "repair"));
+  if (tally.most_cuts.value_or(0) > 0)
+    text += fmt::format(", up to {} of cloth in a frame", count_of(*tally.most_cuts, "cut"));
   if (result.reconnections > 0)
     text += fmt::format(", connected again {}", count_of(result.reconnections, "time"));
   context.answer(json, text + '\n');

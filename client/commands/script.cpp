@@ -139,7 +139,8 @@ pause    stops what runs
 snapshot snapshot: a name; keeps the session as it is now
 restore  snapshot; session: a new one that goes on from there
 expect   frame, time_s, at_rest, rest_time_s; largest_strain, of all frames;
-         strain, kinetic_energy_j, potential_energy_j, energy_j, of the newest;
+         strain, cloth_cuts, kinetic_energy_j, potential_energy_j, energy_j,
+         of the newest;
          particle: {sheet, row, column, x_m, y_m, z_m};
          each a value, {min, max} or {near, within}
 

@@ -98,6 +98,9 @@ class Display {
             .add("kinetic energy", number_text(stats.kinetic_energy_j()) + " J")
             .add("potential energy", number_text(stats.potential_energy_j()) + " J")
             .add("largest strain", percent_text(stats.largest_strain()))
+            .add("cuts of cloth", stats.has_cloth_cut_count()
+                                      ? std::to_string(stats.cloth_cut_count())
+                                      : "not counted")
             .add("speed", fmt::format("{:.2f} x real time", pace_now_))
             .add("at rest", stats.at_rest() ? "yes" : "no")
             .text());

@@ -128,6 +128,10 @@ Rows run_rows(const RecordingReader& recording, const Tally& tally) {
   rows.emplace_back("substeps", std::to_string(tally.substeps));
   rows.emplace_back("substep at the end", seconds_text(end.substep_s()));
   rows.emplace_back("largest strain", percent_text(tally.largest_strain));
+  if (tally.most_cuts)
+    rows.emplace_back(
+        "cuts of cloth",
+        *tally.most_cuts == 0 ? "none" : fmt::format("{} in a frame at most", *tally.most_cuts));
   rows.emplace_back("repairs", tally.repairs == 0 ? "none" : std::to_string(tally.repairs));
   rows.emplace_back("at rest at the end", end.at_rest() ? "yes" : "no");
   return rows;

@@ -40,6 +40,7 @@ const kCurrent = [
   ['kinetic energy', ({stats}) => `${digits(stats.kinetic_energy_j)} J`],
   ['potential energy', ({stats}) => `${digits(stats.potential_energy_j)} J`],
   ['substeps', ({stats}) => (stats.substep_s > 0 ? `${stats.substep_count} of ${digits(1e6 * stats.substep_s)} µs` : '0')],
+  ['cuts of cloth', ({stats}) => `${stats.cloth_cut_count ?? 'not counted'}`],
   ['repairs', ({stats}) => `${stats.repair_count}`],
   ['at rest', ({stats}) => (stats.at_rest ? 'yes' : 'no')],
 ];

@@ -118,6 +118,7 @@ Json stats_json(const std::vector<v1::FrameStats>& stats) {
     json["potential_energy_j"].push_back(frame.potential_energy_j());
     json["largest_strain"].push_back(frame.largest_strain());
     json["substep_count"].push_back(frame.substep_count());
+    if (frame.has_cloth_cut_count()) json["cloth_cut_count"].push_back(frame.cloth_cut_count());
   }
   return json;
 }

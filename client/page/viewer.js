@@ -80,6 +80,7 @@ const kCurrent = [
   ['kinetic energy', (r, k) => r.stats && `${digits(r.stats.kinetic_energy_j[k])} J`],
   ['potential energy', (r, k) => r.stats && `${digits(r.stats.potential_energy_j[k])} J`],
   ['substeps', (r, k) => r.stats && `${r.stats.substep_count[k]}`],
+  ['cuts of cloth', (r, k) => r.stats?.cloth_cut_count && `${r.stats.cloth_cut_count[k]}`],
 ];
 let currentCells = [];
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "weft/v1/frame.pb.h"
 
@@ -16,7 +17,8 @@ struct Tally {
   std::int64_t substeps = 0;
   double largest_strain = 0;
   std::int64_t repairs = 0;
-  std::int64_t bytes = 0;  // of the arrays
+  std::optional<std::int64_t> most_cuts;  // of a frame; where they are counted
+  std::int64_t bytes = 0;                 // of the arrays
   v1::FrameStats last_stats;
 
   void add(const v1::Frame& frame);

@@ -41,7 +41,7 @@ double position(const Sight& sight, const Expectation& expectation) {
   return std::numeric_limits<double>::quiet_NaN();
 }
 
-// NaN where there is none: the time of rest of a sheet in motion.
+// NaN where there is none: the time of rest of a sheet in motion, cuts where they are not counted.
 double value_of(const Sight& sight, const Expectation& expectation) {
   const v1::FrameStats& stats = sight.frame.stats();
   switch (expectation.quantity) {
@@ -57,6 +57,9 @@ double value_of(const Sight& sight, const Expectation& expectation) {
       return sight.tally.largest_strain;
     case Quantity::kStrain:
       return stats.largest_strain();
+    case Quantity::kCuts:
+      return stats.has_cloth_cut_count() ? static_cast<double>(stats.cloth_cut_count())
+                                         : std::numeric_limits<double>::quiet_NaN();
     case Quantity::kKineticEnergy:
       return stats.kinetic_energy_j();
     case Quantity::kPotentialEnergy:

@@ -77,6 +77,7 @@ enum class Quantity {
   kRestTime,
   kLargestStrain,
   kStrain,
+  kCuts,
   kKineticEnergy,
   kPotentialEnergy,
   kEnergy,

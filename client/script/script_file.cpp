@@ -414,6 +414,7 @@ class ScriptReader {
                                      std::pair{"rest_time_s", Quantity::kRestTime},
                                      std::pair{"largest_strain", Quantity::kLargestStrain},
                                      std::pair{"strain", Quantity::kStrain},
+                                     std::pair{"cloth_cuts", Quantity::kCuts},
                                      std::pair{"kinetic_energy_j", Quantity::kKineticEnergy},
                                      std::pair{"potential_energy_j", Quantity::kPotentialEnergy},
                                      std::pair{"energy_j", Quantity::kEnergy}};

@@ -212,6 +212,7 @@ std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order) {
     stats->set_substep_s(frame.substep);
     stats->set_at_rest(frame.at_rest);
     stats->set_repair_count(static_cast<std::int64_t>(frame.repairs.size()));
+    if (frame.stats.cloth_cuts) stats->set_cloth_cut_count(*frame.stats.cloth_cuts);
   }
   return in_parts(std::move(message), order.most_bytes);
 }

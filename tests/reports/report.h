@@ -37,6 +37,7 @@ std::string number(double value);
 // Each writes a page; `large` for finer meshes and more cases.
 void accuracy(const std::filesystem::path& folder, const std::string& commit, bool large);
 void stability(const std::filesystem::path& folder, const std::string& commit, bool large);
+void contact(const std::filesystem::path& folder, const std::string& commit, bool large);
 void mesh(const std::filesystem::path& folder, const std::string& commit, bool large);
 // Of what weft-bench left in runs.json there.
 void speed(const std::filesystem::path& folder, const std::string& commit, bool large);

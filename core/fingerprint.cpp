@@ -70,7 +70,9 @@ std::uint64_t fingerprint() {
   for (Scene* scene : {&single, &twofold})
     scene->sheets.push_back(rough_sheet(rough_mesh(), Isometric{}));
   twofold.solver.precision = Precision::kDouble;
-  for (const Scene& scene : {single, twofold, plain}) {
+  Scene tethered = single;
+  for (SheetDefinition& sheet : tethered.sheets) sheet.tether_stretch = 0;
+  for (const Scene& scene : {single, twofold, plain, tethered}) {
     Simulation simulation(scene);
     std::vector<double> x(3 * static_cast<std::size_t>(simulation.particle_count()));
     for (int frame = 0; frame < 4; ++frame) {

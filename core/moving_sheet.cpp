@@ -5,16 +5,15 @@
 
 #include "core/forces/air.h"
 #include "core/forces/elastic.h"
-#include "core/motion/stability.h"
 
 namespace weft {
 
 void MovingSheet::set_definition(const Scene& scene, const SheetDefinition& definition) {
   Mesh made = make_mesh(definition);
   if (const auto& ratio = definition.textile.damping_ratio)
-    made.damping = damping_for(made, *ratio);
+    made.damping = damping_of(definition, made, *ratio);
   else if (!definition.textile.damping)
-    made.damping = std::max(kDefaultDamping, damping_for(made, kSafeDampingRatio));
+    made.damping = std::max(kDefaultDamping, damping_of(definition, made, kSafeDampingRatio));
   set_mesh(scene, definition, std::move(made));
   dynamics.gravity = scene.environment.gravity;
   skin = definition.skin_or_default();
@@ -23,7 +22,7 @@ void MovingSheet::set_definition(const Scene& scene, const SheetDefinition& defi
 void MovingSheet::set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made) {
   mesh = std::move(made);
   if (!scene.environment.wind) mesh.triangles = std::vector<std::array<int, 3>>();
-  set_pins(definition.pins);
+  set_pins(definition);
   dynamics.drag = mesh.drag;
 }
 
@@ -33,6 +32,7 @@ void MovingSheet::release_memory() {
   mesh = {};
   mesh.damping = damping;
   dynamics.inverse_mass = dynamics.drag = VectorXd();
+  dynamics.tethers = {};
   solver->release_memory();
 }
 
@@ -43,10 +43,11 @@ void MovingSheet::restore_memory(const Scene& scene, const SheetDefinition& defi
   solver->restore_memory();
 }
 
-void MovingSheet::set_pins(const std::vector<Pin>& pins) {
+void MovingSheet::set_pins(const SheetDefinition& definition) {
   dynamics.inverse_mass = mesh.mass.cwiseInverse();
-  for (const Pin& pin : pins)
+  for (const Pin& pin : definition.pins)
     for (const int i : pin.particles) dynamics.inverse_mass[i] = 0;
+  dynamics.tethers = make_tethers(definition);
 }
 
 void MovingSheet::bind_forces(const Scene& scene) {

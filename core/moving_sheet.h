@@ -29,7 +29,8 @@ struct MovingSheet {
   // same.
   void release_memory();
   void restore_memory(const Scene& scene, const SheetDefinition& definition);
-  void set_pins(const std::vector<Pin>& pins);
+  // What holds its particles.
+  void set_pins(const SheetDefinition& definition);
   // What the mesh or the scene lacks is not there to be computed. Holds on to both.
   void bind_forces(const Scene& scene);
 

@@ -12,6 +12,7 @@
 #include "core/model/text.h"
 #include "core/motion/stability.h"
 #include "core/sheet_factory.h"
+#include "core/tether_warnings.h"
 #include "core/triangles/triangles.h"
 #include "core/triangles/warnings.h"
 
@@ -46,9 +47,10 @@ double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& me
 std::vector<StableStep> stable_steps(const Scene& scene, const std::vector<PlannedSheet>& planned) {
   std::vector<StableStep> steps;
   for (std::size_t s = 0; s < planned.size(); ++s) {
-    const auto& [mesh, inverse_mass, x] = planned[s];
-    steps.push_back(stable_step(mesh, inverse_mass, scene.solver.integrator,
-                                air_rate(scene, scene.sheets[s], mesh), x));
+    const PlannedSheet& sheet = planned[s];
+    steps.push_back(stable_step_of(scene.sheets[s], sheet.mesh, sheet.inverse_mass,
+                                   scene.solver.integrator,
+                                   air_rate(scene, scene.sheets[s], sheet.mesh), sheet.x));
   }
   return steps;
 }
@@ -237,16 +239,18 @@ void warn_of_tension(const SheetDefinition& sheet, std::size_t index, Plan& plan
                                   " N/m: the shear connections pull along with the threads")});
 }
 
-std::string tensile_text(const Textile& textile) {
-  if (const auto* raw = std::get_if<RawTextile>(&textile.model)) return join(raw->stretch, " N/m");
+std::string stiffness_text(const Textile& textile) {
+  if (const auto* raw = std::get_if<RawTextile>(&textile.model))
+    return join(raw->stretch, " N/m, in shear ", raw->shear, " N/m");
   const auto& measured = std::get<MeasuredTextile>(textile.model);
-  return join(measured.tensile_warp, " and ", measured.tensile_weft, " N/m");
+  return join(measured.tensile_warp, " and ", measured.tensile_weft, " N/m, in shear ",
+              measured.shear, " N/m");
 }
 
 void describe_stretch(const Scene& scene, std::size_t index, Plan& plan) {
   const SheetDefinition& sheet = scene.sheets[index];
-  const auto [warp, weft] = self_weight_strain(sheet, scene.environment);
-  plan.stretch_costs.push_back({sheet.name, std::max(warp, weft)});
+  const SelfWeightStrain strain = self_weight_strain(sheet, scene.environment);
+  plan.stretch_costs.push_back({sheet.name, std::max(strain.warp, strain.weft)});
   if (!scene.solver.max_self_weight_strain) return;
   const double most = *scene.solver.max_self_weight_strain;
   SheetDefinition capped = sheet;
@@ -254,9 +258,10 @@ void describe_stretch(const Scene& scene, std::size_t index, Plan& plan) {
   if (capped.textile == sheet.textile) return;
   plan.warnings.push_back(
       {"STRETCH_CAPPED", sheet_path(index) + ".textile",
-       join("a tensile stiffness of ", tensile_text(sheet.textile), " is simulated as ",
-            tensile_text(capped.textile), ", with which the sheet, hung by an edge, stretches by ",
-            100 * most, " % under its own weight (solver.max_self_weight_strain)")});
+       join("a tensile stiffness of ", stiffness_text(sheet.textile), ", is simulated as ",
+            stiffness_text(capped.textile),
+            ", with which the sheet, hung by an edge, stretches by ", 100 * most,
+            " % under its own weight (solver.max_self_weight_strain)")});
 }
 
 // Where damping is so low that energy may come from nothing.
@@ -279,7 +284,7 @@ void warn_of_damping(const Scene& scene, const std::vector<PlannedSheet>& planne
   }
   if (scene.solver.integrator != IntegratorKind::kVerlet || safe_share(ratio) == 1) return;
   const double safe = share_of(scene.solver, stable) * stable.linear_bound;
-  const double enough = damping_for(mesh, kSafeDampingRatio);
+  const double enough = damping_of(scene.sheets[index], mesh, kSafeDampingRatio);
   if (const auto& asked = scene.solver.substep; asked && *asked > safe * (1 + 1e-9))
     plan.warnings.push_back(
         {"UNDERDAMPED", field,
@@ -376,6 +381,7 @@ Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
         {scene.sheets[s].name, sheets[s].mesh.damping, steps[s].connection_ratio});
     describe_solver(scene, scene.sheets[s], plan);
     describe_forces(scene.sheets[s], sheets[s].mesh, plan);
+    describe_tethers(scene, s, sheets[s], plan);
     plan.particle_substeps += scene.sheets[s].particle_count() / plan.step.substep;
   }
   const auto pass = [&](const char* name, bool runs, const char* why_not) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/model/mesh.h"
+#include "core/motion/tethers.h"
 
 namespace weft {
 
@@ -81,6 +82,7 @@ struct PlannedSheet {
   const Mesh& mesh;
   const VectorXd& inverse_mass;  // (particles) 1/kg, 0: held
   const Matrix3Xd& x;            // (3 x particles) m
+  const Tethers& tethers;
 };
 
 // sheets: those of the scene, in order.

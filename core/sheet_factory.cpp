@@ -1,7 +1,13 @@
 #include "core/sheet_factory.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "core/lattice/lattice.h"
+#include "core/lattice/sample.h"
 #include "core/lattice/solver.h"
+#include "core/lattice/tethers.h"
+#include "core/triangles/geodesics.h"
 #include "core/triangles/solver.h"
 #include "core/triangles/triangles.h"
 
@@ -9,6 +15,42 @@ namespace weft {
 
 Mesh make_mesh(const SheetDefinition& sheet) {
   return std::holds_alternative<Grid>(sheet.shape) ? make_lattice(sheet) : make_triangles(sheet);
+}
+
+StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,
+                          const VectorXd& inverse_mass, IntegratorKind integrator, double air_rate,
+                          const Matrix3Xd& x) {
+  if (!is_large(sheet.shape)) return stable_step(mesh, inverse_mass, integrator, air_rate, x);
+  const auto step_of = [&](int particle) {
+    const LatticeSample sample = sample_of(grid_of(sheet), mesh, particle);
+    return stable_step(sample.mesh, sample.mesh.mass.cwiseInverse(), integrator, air_rate,
+                       x(Eigen::all, sample.particles));
+  };
+  StableStep step = step_of(0);
+  if (const int tautest = tautest_particle(mesh, x); tautest > 0)
+    step.estimate = std::min(step.estimate, step_of(tautest).estimate);
+  return step;
+}
+
+double damping_of(const SheetDefinition& sheet, const Mesh& mesh, double ratio) {
+  if (!is_large(sheet.shape)) return damping_for(mesh, ratio);
+  return damping_for(sample_of(grid_of(sheet), mesh).mesh, ratio);
+}
+
+Tethers make_tethers(const SheetDefinition& sheet) {
+  if (!sheet.tether_stretch) return {};
+  Tethers tethers = find_attachments(sheet);
+  if (const auto* grid = std::get_if<Grid>(&sheet.shape))
+    measure_tethers(*grid, tethers);
+  else
+    measure_tethers(rest_shape(triangles_in(sheet)), tethers);
+  for (Attachment& attachment : tethers) {
+    for (double& length : attachment.length) length *= 1 + *sheet.tether_stretch;
+    for (const Pin& pin : sheet.pins)
+      for (const int i : pin.particles)
+        attachment.length[static_cast<std::size_t>(i)] = std::numeric_limits<double>::infinity();
+  }
+  return tethers;
 }
 
 std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefinition& sheet,

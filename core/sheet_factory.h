@@ -6,12 +6,22 @@
 
 #include "core/model/mesh.h"
 #include "core/motion/sheet_solver.h"
+#include "core/motion/stability.h"
 
 namespace weft {
 
 // Where kinds of sheets are told apart: what a sheet's shape asks for.
 
 Mesh make_mesh(const SheetDefinition& sheet);
+
+// As stable_step() and damping_for(); of a large lattice by samples of it.
+StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,
+                          const VectorXd& inverse_mass, IntegratorKind integrator, double air_rate,
+                          const Matrix3Xd& x);
+double damping_of(const SheetDefinition& sheet, const Mesh& mesh, double ratio);
+
+// What keeps a sheet's free particles within the reach of held ones, if it asks for that.
+Tethers make_tethers(const SheetDefinition& sheet);
 
 // Makes what moves a sheet, of which `mesh` was made; it and `dynamics` outlive it.
 using SolverFactory = std::function<std::unique_ptr<SheetSolver>(

@@ -67,6 +67,7 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
     // forces and motion
     sheet.solver->advance(time, pool);
     move_pins(definition.pins, time + dt, dt, sheet);
+    if (!sheet.dynamics.tethers.empty()) sheet.solver->pull_back(pool);
   }
   if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame);
 
@@ -269,7 +270,7 @@ Plan Simulation::State::plan_for(const std::vector<Matrix3Xd>& x) const {
   std::vector<PlannedSheet> planned;
   planned.reserve(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s)
-    planned.push_back({sheets[s].mesh, inverse_mass[s], x[s]});
+    planned.push_back({sheets[s].mesh, inverse_mass[s], x[s], sheets[s].dynamics.tethers});
   Plan made = make_plan(scene, planned);
   if (made.step.substeps <= kMaxSubsteps) repairs.shorten(made.step);
   return made;

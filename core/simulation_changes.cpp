@@ -135,7 +135,7 @@ Constraints Simulation::State::constraints() const {
 void Simulation::State::adopt(Constraints constraints) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     scene.sheets[s].pins = std::move(constraints.pins[s]);
-    sheets[s].set_pins(scene.sheets[s].pins);
+    sheets[s].set_pins(scene.sheets[s]);
   }
   for (std::size_t c = 0; c < scene.colliders.size(); ++c)
     scene.colliders[c].path = std::move(constraints.paths[c]);

@@ -9,6 +9,7 @@
 
 #include "core/lattice/contact.h"
 #include "core/lattice/law.h"
+#include "core/lattice/tethers.h"
 #include "core/motion/gaps.h"
 #include "core/motion/saved_values.h"
 
@@ -50,6 +51,8 @@ class LatticeSolver : public SheetSolver {
         at[State::kW + axis] = static_cast<T>(v(axis, i) * 2 * dt);
       at[State::kStep2] = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
     });
+    tethers_ = {dynamics_.tethers, law_.layout};
+    held_moved_ = true;
     gaps_.forget();
     pushed_ = 0;
   }
@@ -75,7 +78,27 @@ class LatticeSolver : public SheetSolver {
     for (int axis = 0; axis < 3; ++axis)
       at[State::kW + axis] = static_cast<T>(3 * d[axis]) - at[State::kD + axis];
     set_displacement(at, d);
+    held_moved_ = true;
     if (measures_) moved_ = std::max(moved_, d.norm());
+  }
+
+  void pull_back(ThreadPool& pool) override {
+    if (std::exchange(held_moved_, false)) tethers_.read_ends(state_);
+    const auto pull = [&](int first, int last) {
+      return pull_back_rows(tethers_, static_cast<T>(kInward * dt_), law_.compensated, first, last,
+                            state_);
+    };
+    const int rows = law_.layout.rows, shares = bands(pool);
+    if (shares == 1) {
+      moved_ += pull(0, rows);
+      return;
+    }
+    std::vector<T> back(static_cast<std::size_t>(shares));
+    pool.run(shares, [&](int share) {
+      back[static_cast<std::size_t>(share)] =
+          pull(rows * share / shares, rows * (share + 1) / shares);
+    });
+    moved_ += *std::max_element(back.begin(), back.end());
   }
 
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
@@ -127,7 +150,14 @@ class LatticeSolver : public SheetSolver {
     return std::max(1, std::min(particles_ / kParticles, law_.layout.rows / kRows));
   }
 
-  void release_memory() override { state_.release_memory(); }
+  void release_memory() override {
+    state_.release_memory();
+    tethers_ = {};
+  }
+  void restore_memory() override {
+    tethers_ = {dynamics_.tethers, law_.layout};
+    held_moved_ = true;
+  }
 
   void positions(Matrix3Xd& x) const override {
     x.resize(3, particles_);
@@ -172,6 +202,7 @@ class LatticeSolver : public SheetSolver {
     loaded.take(&measured, 1);
     law_.measured = measured != 0;
     gaps_.load(loaded);
+    held_moved_ = true;
     for (int plane = 0; plane < state_.planes(); ++plane)
       for_each_particle([&](int, Place at) { loaded.take(&at[plane], 1); });
     return loaded.all_taken();
@@ -275,6 +306,8 @@ class LatticeSolver : public SheetSolver {
   double damping_, dt_ = 0;
   SweepLaw<T> law_;
   State state_;
+  LatticeTethers<T> tethers_;
+  bool held_moved_ = true;  // since the ends of tethers were read
   bool started_ = false;
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
   double moved_ = 0;                    // farthest displacement of the last step, m

@@ -200,6 +200,8 @@ void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& 
   constexpr double kThinnest = 1e-6;
   if (sheet.thickness)
     check.number(field + ".thickness_m", *sheet.thickness, kThinnest, most_thickness(sheet), "m");
+  if (sheet.tether_stretch)
+    check.number(field + ".tether_stretch", *sheet.tether_stretch, 0, 1, "");
   check_values(field + ".start_positions_m", sheet.start_positions, sheet.particle_count(), 1e4,
                "m", check);
   check_values(field + ".start_velocities_m_per_s", sheet.start_velocities, sheet.particle_count(),

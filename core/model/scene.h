@@ -76,6 +76,9 @@ struct SheetDefinition {
   // At which it keeps cloth away, its own and other sheets', m; absent: 2 mm, or as much as the
   // mesh allows.
   std::optional<double> thickness;
+  // Keeps free particles within the reach of held ones: as far as the cloth between them is long,
+  // and this share of it more. Absent: nothing does but the textile.
+  std::optional<double> tether_stretch;
 
   int particle_count() const { return weft::particle_count(shape); }
   double spacing() const { return weft::spacing(shape); }                   // m
@@ -146,7 +149,7 @@ struct SolverSettings {
   // Most halvings of the step by the guard; 0: only what is not finite stops a run.
   int max_repairs = 12;
   // Most that a sheet may stretch under its own weight: stiffer textiles are simulated as soft as
-  // that, with longer steps. Absent: as stiff as given.
+  // that, in shear too, with longer steps. Absent: as stiff as given.
   std::optional<double> max_self_weight_strain;
 };
 

@@ -26,21 +26,26 @@ Load load_of(const SheetDefinition& sheet, const Environment& environment) {
 
 SelfWeightStrain self_weight_strain(const SheetDefinition& sheet, const Environment& environment) {
   const Load load = load_of(sheet, environment);
+  const double most = std::max(load.warp, load.weft);
   if (const auto* measured = std::get_if<MeasuredTextile>(&sheet.textile.model))
-    return {load.warp / measured->tensile_warp, load.weft / measured->tensile_weft};
-  const double stretch = std::get<RawTextile>(sheet.textile.model).stretch;
-  return {load.warp / stretch, load.weft / stretch};
+    return {load.warp / measured->tensile_warp, load.weft / measured->tensile_weft,
+            most / (2 * measured->shear)};
+  const auto& raw = std::get<RawTextile>(sheet.textile.model);
+  return {load.warp / raw.stretch, load.weft / raw.stretch, most / raw.shear};  // k = 2 G
 }
 
 void cap_stretch(SheetDefinition& sheet, const Environment& environment, double strain) {
   const Load load = load_of(sheet, environment);
+  const double most = std::max(load.warp, load.weft) / strain;
   const auto cap = [&](Textile& textile) {
     if (auto* measured = std::get_if<MeasuredTextile>(&textile.model)) {
       measured->tensile_warp = std::min(measured->tensile_warp, load.warp / strain);
       measured->tensile_weft = std::min(measured->tensile_weft, load.weft / strain);
+      measured->shear = std::min(measured->shear, most / 2);  // k = 2 G
     } else {
       auto& raw = std::get<RawTextile>(textile.model);
-      raw.stretch = std::min(raw.stretch, std::max(load.warp, load.weft) / strain);
+      raw.stretch = std::min(raw.stretch, most);
+      raw.shear = std::min(raw.shear, most);
     }
   };
   cap(sheet.textile);

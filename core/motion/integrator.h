@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "core/model/mesh.h"
+#include "core/motion/tethers.h"
 
 namespace weft {
 
@@ -23,6 +24,7 @@ struct Dynamics {
   Vector3d gravity;       // m/s^2
   // Velocity of the air that drags, m/s.
   std::function<Vector3d(double)> air;
+  Tethers tethers;  // empty: none
 };
 
 // Steps a sheet in time. dt in s.

@@ -14,7 +14,7 @@ class PlainSolver : public SheetSolver {
 
   void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
     dt_ = dt;
-    pushed_ = 0;
+    pushed_ = pulled_ = 0;
     motion_.x = x;
     integrator_->start(dynamics_, time, dt, v, motion_);
   }
@@ -26,6 +26,15 @@ class PlainSolver : public SheetSolver {
   void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
     motion_.x.col(particle) = x;
     motion_.d.col(particle) = d;
+  }
+
+  void pull_back(ThreadPool& /*pool*/) override {
+    pulled_ = weft::pull_back(
+        dynamics_.tethers, kInward * dt_,
+        [&](int i) {
+          return Moved{motion_.x.col(i), motion_.d.col(i)};
+        },
+        [&](int i, const Moved& to) { motion_.x.col(i) = to.x, motion_.d.col(i) = to.d; });
   }
 
   void resolve(const Contacts& contacts, ThreadPool& /*pool*/) override {
@@ -41,7 +50,9 @@ class PlainSolver : public SheetSolver {
   }
 
   void measure() override {}
-  double moved() const override { return std::sqrt(motion_.d.colwise().squaredNorm().maxCoeff()); }
+  double moved() const override {
+    return std::sqrt(motion_.d.colwise().squaredNorm().maxCoeff()) + pulled_;
+  }
   double pushed() const override { return pushed_; }
   void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
             Eigen::Ref<Matrix3Xd> d) const override {
@@ -82,7 +93,7 @@ class PlainSolver : public SheetSolver {
   std::unique_ptr<Integrator> integrator_;
   Motion motion_;
   double dt_ = 0;
-  double pushed_ = 0;  // m
+  double pushed_ = 0, pulled_ = 0;  // by colliders and tethers, m
 };
 
 }  // namespace

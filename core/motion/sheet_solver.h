@@ -23,6 +23,8 @@ class SheetSolver {
   virtual void advance(double time, ThreadPool& pool) = 0;
   // Puts a held particle where its path leads it: position and displacement of the step, m.
   virtual void move_held(int particle, const Vector3d& x, const Vector3d& d) = 0;
+  // Moves free particles back to where their tethers reach.
+  virtual void pull_back(ThreadPool& pool) = 0;
   // Moves free particles out of colliders.
   virtual void resolve(const Contacts& contacts, ThreadPool& pool) = 0;
 

@@ -75,6 +75,15 @@ class TriangleSolver : public SheetSolver {
     if (measures_) moved_ = std::max(moved_, d.norm());
   }
 
+  void pull_back(ThreadPool& /*pool*/) override {
+    const auto get = [&](int i) {
+      return Moved{position_at(place(i)), exact(state_.d, state_.d_error, place(i))};
+    };
+    moved_ += weft::pull_back(dynamics_.tethers, kInward * dt_, get, [&](int i, const Moved& to) {
+      add(i, to.x - position_at(place(i)), to.d - exact(state_.d, state_.d_error, place(i)));
+    });
+  }
+
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
     const bool in_parts = contacts.may_cross(moved_);
@@ -110,12 +119,7 @@ class TriangleSolver : public SheetSolver {
                 const Eigen::Ref<const Matrix3Xd>& in_step) override {
     moved_ += std::sqrt(by.colwise().squaredNorm().maxCoeff());
     for (Eigen::Index k = 0; const int i : particles) {
-      const std::size_t at = place(i);
-      set_at(state_.x, state_.x_error, at, position_at(at) + by.col(k) - origin_);
-      set_at(state_.d, state_.d_error, at, exact(state_.d, state_.d_error, at) + in_step.col(k));
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        state_.w.data()[at + axis] +=
-            static_cast<T>(3 * in_step(static_cast<Eigen::Index>(axis), k));
+      add(i, by.col(k), in_step.col(k));
       ++k;
     }
   }
@@ -230,6 +234,14 @@ class TriangleSolver : public SheetSolver {
       const T rounded = plane.data()[at + axis] = static_cast<T>(value);
       if (law_.compensated) error.data()[at + axis] = static_cast<T>(double{rounded} - value);
     }
+  }
+  // Moves a free particle: adds to its position and its displacement of the step, m.
+  void add(int particle, const Vector3d& by, const Vector3d& in_step) {
+    const std::size_t at = place(particle);
+    set_at(state_.x, state_.x_error, at, position_at(at) + by - origin_);
+    set_at(state_.d, state_.d_error, at, exact(state_.d, state_.d_error, at) + in_step);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      state_.w.data()[at + axis] += static_cast<T>(3 * in_step[static_cast<Eigen::Index>(axis)]);
   }
   void put(AlignedArray<T>& plane, int particle, const Vector3d& values) {
     for (std::size_t axis = 0; axis < 3; ++axis)

@@ -157,6 +157,7 @@ SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
   }
   if (from.has_skin_m()) sheet.skin = from.skin_m();
   if (from.has_thickness_m()) sheet.thickness = from.thickness_m();
+  if (from.has_tether_stretch()) sheet.tether_stretch = from.tether_stretch();
   return sheet;
 }
 

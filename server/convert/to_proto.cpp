@@ -109,6 +109,7 @@ void set(v1::Sheet* to, const SheetDefinition& from, const Textile& textile,
   for (const auto& pin : from.pins) *to->add_pins() = to_proto(pin);
   to->set_skin_m(from.skin_or_default());
   to->set_thickness_m(from.thickness_or_default());
+  if (from.tether_stretch) to->set_tether_stretch(*from.tether_stretch);
 }
 
 void set(v1::Collider* to, const Plane& plane) {

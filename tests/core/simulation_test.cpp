@@ -231,6 +231,26 @@ TEST(Simulation, ATextileTooStiffToNoticeMayBeSimulatedAsSoftAsASelfWeightStrain
   EXPECT_EQ(simulation.plan().step.substeps, Simulation(scene).plan().step.substeps);
 }
 
+TEST(Simulation, ATextileThatIsSimulatedSofterIsSoInShearToo) {
+  Scene scene = hanging();
+  auto& textile = std::get<RawTextile>(scene.sheets[0].textile.model);
+  textile.stretch = textile.shear = 8000;
+  scene.solver.max_self_weight_strain = 0.01;
+  const Plan stiff = Simulation(scene).plan();
+  const double soft = 8000 * stiff.stretch_costs[0].self_weight_strain / 0.01;
+  textile.stretch = textile.shear = soft;
+  const Plan as_soft = Simulation(scene).plan();
+  EXPECT_EQ(stiff.step.substeps, as_soft.step.substeps);
+
+  // a textile that shears easily keeps its shear
+  textile = {.particle_mass = textile.particle_mass, .stretch = 8000, .shear = soft / 10};
+  EXPECT_TRUE(warns(scene, "STRETCH_CAPPED"));
+  Scene easy = scene;
+  std::get<RawTextile>(easy.sheets[0].textile.model).stretch = soft;
+  const double bound = Simulation(easy).plan().step.linear_bound;
+  EXPECT_NEAR(Simulation(scene).plan().step.linear_bound, bound, 1e-9 * bound);
+}
+
 // c_b L^3 / k_b = 2000 x 0.1^3 / k_b falls below 31.47 at k_b = 0.0636; L is 0.1 on the axes.
 TEST(Simulation, APlanWarnsWhereTheClampLeavesTheBendingConstantWithoutEffect) {
   for (const bool fold_clamp : {false, true}) {

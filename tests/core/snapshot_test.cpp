@@ -114,11 +114,16 @@ const Variant kVariants[] = {
      [](Scene& scene) {
        scene.environment.wind = Wind{.velocity = {3, 0, 1}, .gust = 0.5, .tangential_drag = 0.1};
      }},
-    {"SelfWeightCap", [](Scene& scene) { scene.solver.max_self_weight_strain = 0.01; }},
+    {"SelfWeightCap", [](Scene& scene) { scene.solver.max_self_weight_strain = 0.001; }},
     {"TwoSheets",
      [](Scene& scene) {
        scene.sheets.push_back(flat_sheet(5, 18));
        scene.sheets[1].name = "other";
+     }},
+    {"Tethered",
+     [](Scene& scene) {
+       std::get<RawTextile>(scene.sheets[0].textile.model).stretch = 50;
+       scene.sheets[0].tether_stretch = 0;
      }},
 };
 

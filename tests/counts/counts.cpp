@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "core/simulation.h"
@@ -77,6 +78,22 @@ Simulation bending_taken_away() {
 Simulation without_guard() {
   Scene scene = curtain();
   scene.solver.max_repairs = 0;
+  return simulation(scene);
+}
+
+// With nothing to tether it to.
+Simulation free(std::optional<double> tether_stretch) {
+  Scene scene = curtain();
+  scene.sheets[0].pins.clear();
+  scene.sheets[0].tether_stretch = tether_stretch;
+  return simulation(scene);
+}
+Simulation unpinned() { return free({}); }
+Simulation unpinned_with_tethers() { return free(0); }
+
+Simulation with_tethers() {
+  Scene scene = curtain();
+  scene.sheets[0].tether_stretch = 0;
   return simulation(scene);
 }
 
@@ -165,6 +182,9 @@ int main(int count, char** arguments) {
       {"no_bending", without_bending},
       {"bending_taken_away", bending_taken_away},
       {"no_guard", without_guard},
+      {"tethers", with_tethers},
+      {"unpinned", unpinned},
+      {"unpinned_tethers", unpinned_with_tethers},
       {"asleep", asleep},
       {"triangles", triangles},
       {"triangles_far_collider", triangles_with_far_collider},

@@ -37,6 +37,10 @@ class Counts(unittest.TestCase):
     def test_wind_is_paid_for_by_scenes_with_wind_alone(self):
         self.assertGreater(instructions("wind"), 1.1 * instructions("plain"))
 
+    def test_tethers_cost_a_third_where_something_is_held_and_else_nothing(self):
+        self.assertLess(instructions("tethers"), 1.33 * instructions("plain"))
+        self.assertLess(instructions("unpinned_tethers"), NOTHING * instructions("unpinned"))
+
     def test_the_guard_costs_less_than_a_hundredth_of_a_frame_of_32_substeps(self):
         # templates take 44 and more
         unguarded = instructions("no_guard")

@@ -71,10 +71,12 @@ int main(int argc, char** argv) {
       {"contact", weft::reports::contact},
       {"mesh", weft::reports::mesh},
       {"stability", weft::reports::stability},
-      {"speed", weft::reports::speed}};
+      {"speed", weft::reports::speed},
+      {"tethers", weft::reports::tethers}};
   if (arguments.size() < 3 || !pages.contains(arguments[0])) {
     std::cerr
-        << "usage: weft-report accuracy|contact|mesh|stability|speed FOLDER COMMIT [--large]\n";
+        << "usage: weft-report accuracy|contact|mesh|stability|speed|tethers FOLDER COMMIT "
+           "[--large]\n";
     return 2;
   }
   const bool large = arguments.size() > 3 && arguments[3] == "--large";

@@ -82,6 +82,7 @@ v1::Scene full_scene() {
   add_path(sheet->mutable_pins(0));
   sheet->set_skin_m(0.001);
   sheet->set_thickness_m(0.002);
+  sheet->set_tether_stretch(0.01);
 
   v1::Sheet* measured = scene.add_sheets();
   *measured->mutable_grid() = sheet->grid();

@@ -138,6 +138,7 @@ const Feature kFeatures[] = {
      [](SheetDefinition& s) { s.bending = Isometric{.resist_compression = false}; }},
     {"IsometricMeasuredWithDrag",
      [](SheetDefinition& s) { s.textile = measured(20, 0.1, 1e-3), s.bending = Isometric{}; }},
+    {"Tethered", [](SheetDefinition& s) { s.tether_stretch = 0; }},
     {"Measured", [](SheetDefinition& s) { s.textile = measured(20, 0, 1e-3); }},
     {"MeasuredNoShear", [](SheetDefinition& s) { s.textile = measured(0, 0.1, 0); }},
 };

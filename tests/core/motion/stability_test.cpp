@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "core/lattice/sample.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::testing {
@@ -181,6 +183,48 @@ TEST(StableStep, AnAskedStepThatDividesTheFrameIsTakenAsItIs) {
   EXPECT_EQ(Simulation(scene).plan().step.substeps, 400);
   scene.solver.substep = 2.6e-5;
   EXPECT_EQ(Simulation(scene).plan().step.substeps, 385);
+}
+
+// A window with a corner has the modes that limit the step: of the middle, of edges, where a
+// measured textile has half a mass, and of corners.
+TEST(StableStep, OfALatticeIsThatOfASampleOfIt) {
+  for (const bool measured : {false, true})
+    for (const bool isometric : {false, true}) {
+      SheetDefinition sheet = flat_sheet(130, 171, 0.01);
+      if (measured)
+        sheet.textile.model = MeasuredTextile{.areal_density = 0.2,
+                                              .tensile_warp = 900,
+                                              .tensile_weft = 300,
+                                              .shear = 30,
+                                              .bend_rigidity_warp = 1e-5,
+                                              .bend_rigidity_weft = 2e-5};
+      if (isometric) sheet.bending = Isometric{};
+      const Mesh mesh = make_mesh(sheet);
+      const LatticeSample sample = sample_of(grid_of(sheet), mesh);
+      EXPECT_LT(sample.mesh.mass.size(), mesh.mass.size() / 2);
+      const Matrix3Xd x = stretched(sheet, 0.02);
+      const auto step_of = [](const Mesh& of, const Matrix3Xd& at) {
+        return stable_step(of, of.mass.cwiseInverse(), IntegratorKind::kVerlet, 0, at);
+      };
+      const StableStep whole = step_of(mesh, x);
+      const StableStep part = step_of(sample.mesh, x(Eigen::all, sample.particles));
+      EXPECT_NEAR(part.linear_bound / whole.linear_bound, 1, 3e-4) << measured << isometric;
+      EXPECT_NEAR(part.estimate / whole.estimate, 1, 3e-4) << measured << isometric;
+      EXPECT_NEAR(part.connection_ratio / whole.connection_ratio, 1, 1e-3);
+      EXPECT_NEAR(damping_for(sample.mesh, 0.01) / damping_for(mesh, 0.01), 1, 1e-3);
+    }
+}
+
+TEST(StableStep, OfALargeLatticeIsEstimatedWhereItIsTautest) {
+  const SheetDefinition sheet = flat_sheet(130, 171, 0.01);
+  const Mesh mesh = make_mesh(sheet);
+  Matrix3Xd x = start_positions(sheet);
+  const int taut = 90 * 171 + 120;
+  x.col(taut).y() += 0.05;
+  EXPECT_NEAR(tautest_particle(mesh, x), taut, 2 * 171 + 2);
+  const LatticeSample sample = sample_of(grid_of(sheet), mesh, tautest_particle(mesh, x));
+  EXPECT_NE(std::find(sample.particles.begin(), sample.particles.end(), taut),
+            sample.particles.end());
 }
 
 }  // namespace

@@ -31,6 +31,7 @@ class FaultySolver : public SheetSolver {
   void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
     solver_->move_held(particle, x, d);
   }
+  void pull_back(ThreadPool& pool) override { solver_->pull_back(pool); }
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     solver_->resolve(contacts, pool);
   }

@@ -248,6 +248,9 @@ Config read_config(int argc, const char* const* argv) {
         ->type_name(known_texts[i].type);
   }
   app.add_flag("--insecure", insecure, "Allow a host other machines can reach, unencrypted");
+  app.add_flag(
+      "--until-eof", config.until_eof,
+      "End, as on SIGTERM, when standard input does: with\nthe program that started this one");
   app.add_option("--log-level", log_level, "trace, debug, info, warn, error or off [info]")
       ->type_name("LEVEL");
   app.set_version_flag("--version", std::string("weftd ") + WEFT_VERSION);

@@ -11,7 +11,8 @@ namespace weft {
 struct Config {
   ServerOptions server;
   std::int64_t idle_s = 3600, asset_ttl_s = 86'400;
-  bool insecure = false;  // may listen beyond this machine, without encryption
+  bool insecure = false;   // may listen beyond this machine, without encryption
+  bool until_eof = false;  // ends when standard input does
   std::string log_level = "info";
 };
 

@@ -3,12 +3,15 @@
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
+#include <array>
+#include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <thread>
 
 #include "server/config.h"
 #include "server/server.h"
@@ -34,6 +37,18 @@ int await(const sigset_t& signals, weft::Server& server) {
   return signal;
 }
 
+// Takes the end of standard input for a signal.
+void watch_input() {
+  std::thread([] {
+    std::array<char, 256> ignored{};
+    ssize_t count = 0;
+    while ((count = read(STDIN_FILENO, ignored.data(), ignored.size())) > 0 ||
+           (count < 0 && errno == EINTR)) {
+    }
+    kill(getpid(), SIGTERM);
+  }).detach();
+}
+
 int serve(const weft::Config& config) {
   // blocked before there are threads, so that none but this one takes them
   sigset_t signals;
@@ -41,6 +56,8 @@ int serve(const weft::Config& config) {
   sigaddset(&signals, SIGINT);
   sigaddset(&signals, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+
+  if (config.until_eof) watch_input();
 
   std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error like a full disk
 

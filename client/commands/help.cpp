@@ -122,6 +122,29 @@ whether it is done (weft help errors):
   done | jq -r '[.file, .largest_strain] | @tsv'
 --embedded needs no server; with one, WEFT_SERVER names it for all commands.
 )"},
+    Topic{"python", "The package weft for Python, with frames as arrays of numpy",
+          R"(It is the Debian package python3-weft, and build/release/python for pip.
+weft.serve() starts a weftd that ends with the program; weft.connect(ADDRESS,
+TOKEN) speaks to another, by default that of WEFT_SERVER and its like.
+
+  import weft
+  with weft.serve() as server:
+      sheet = weft.Sheet.grid(31, 31, 1 / 30, weft.Textile.preset("denim_11oz"))
+      ball = weft.Collider(weft.Sphere(0.3, center_m=(0.5, -0.4, 0.5)))
+      session = server.create_session(weft.Scene([sheet], [ball]))
+      session.run(until_rest=True)
+      for frame in session.frames():
+          frame.positions        # (n, 3), m
+
+  weft.Scene.load(FILE)          a scene file
+  session.set_textile(T, over=2) from one textile to another, within 2 s
+  session.grab, drag, release    a hand
+  server.restore(session.snapshot().name)  keeps it, and goes on from there
+  session.view()                 the newest frame, for those who draw
+  weft.open(FILE).positions(97)  a frame of a recording
+  weft.aio                       the same, to be awaited
+  weft.Error                     code, reason, violations (field, description)
+)"},
     Topic{"security", "Who may use a server, and how weft shows who it is",
           R"(weftd listens on loopback, unencrypted. Where other machines reach it, it wants
 --tls-cert and --tls-key, or --insecure. With --tokens FILE whoever calls needs

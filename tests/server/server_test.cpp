@@ -266,6 +266,7 @@ TEST(Config, HelpsWithEveryFlag) {
                            "--replica",
                            "--idle-s",
                            "--insecure",
+                           "--until-eof",
                            "--workers",
                            "--max-sessions",
                            "--max-particles",

@@ -1,0 +1,52 @@
+"""Weft simulates textiles as a service; this is its client.
+
+What is given to a server are the dataclasses of `weft.scene`; what it answers are the messages of
+`weft.v1`, whose comments in proto/weft/v1 are the manual. Units are SI and stand in the names.
+`weft.aio` has the same to be awaited.
+"""
+from . import aio, errors, v1
+from .client import Hand, Server, Session, connect, serve
+from .errors import Damaged, Error, InvalidArgument, NoConnection, NotFound, Violation
+from .frame import Frame
+from .recording import Recording, open
+from .scene import (
+    BendingLaw,
+    BodyMesh,
+    Box,
+    Capsule,
+    ChoiKo,
+    Collider,
+    Drag,
+    Environment,
+    Grab,
+    Grid,
+    Isometric,
+    Keyframe,
+    MeasuredTextile,
+    MeshData,
+    MoveCollider,
+    Panel,
+    Pin,
+    PinParticle,
+    Placement,
+    Plane,
+    RawTextile,
+    Release,
+    Scene,
+    Sheet,
+    SolverSettings,
+    Sphere,
+    Textile,
+    TriangleSheet,
+    UnpinParticle,
+    Wind,
+)
+
+__all__ = [
+    "BendingLaw", "BodyMesh", "Box", "Capsule", "ChoiKo", "Collider", "Damaged", "Drag",
+    "Environment", "Error", "Frame", "Grab", "Grid", "Hand", "InvalidArgument", "Isometric",
+    "Keyframe", "MeasuredTextile", "MeshData", "MoveCollider", "NoConnection", "NotFound", "Panel",
+    "Pin", "PinParticle", "Placement", "Plane", "RawTextile", "Recording", "Release", "Scene",
+    "Server", "Session", "Sheet", "SolverSettings", "Sphere", "Textile", "TriangleSheet",
+    "UnpinParticle", "Violation", "Wind", "aio", "connect", "errors", "open", "serve", "v1",
+]

@@ -72,7 +72,9 @@ std::uint64_t fingerprint() {
   twofold.solver.precision = Precision::kDouble;
   Scene tethered = single;
   for (SheetDefinition& sheet : tethered.sheets) sheet.tether_stretch = 0;
-  for (const Scene& scene : {single, twofold, plain, tethered}) {
+  Scene touching = twofold;
+  touching.cloth_contact = true;
+  for (const Scene& scene : {single, twofold, plain, tethered, touching}) {
     Simulation simulation(scene);
     std::vector<double> x(3 * static_cast<std::size_t>(simulation.particle_count()));
     for (int frame = 0; frame < 4; ++frame) {

@@ -30,9 +30,8 @@ std::string numbers_text(const v1::FrameFormat& format) {
   }
 }
 
-std::string cuts_text(const Tally& tally) {
-  if (!tally.most_cuts) return "not counted: the scene has no cloth contact";
-  return *tally.most_cuts == 0 ? "none" : fmt::format("{} in a frame at most", *tally.most_cuts);
+std::string cuts_text(std::int64_t most) {
+  return most == 0 ? "none" : fmt::format("{} in a frame at most", most);
 }
 
 std::string facts_text(const RecordingReader& recording, const Inspection& inspection) {
@@ -57,9 +56,9 @@ std::string facts_text(const RecordingReader& recording, const Inspection& inspe
         .add("simulated time",
              fmt::format("{:.6g} s to {:.6g} s", tally.first_time_s, tally.last_time_s))
         .add("largest strain", percent_text(tally.largest_strain))
-        .add("repairs", tally.repairs == 0 ? "none" : std::to_string(tally.repairs))
-        .add("cuts of cloth", cuts_text(tally))
-        .add("kinetic energy", number_text(tally.last_stats.kinetic_energy_j()) + " J at the end")
+        .add("repairs", tally.repairs == 0 ? "none" : std::to_string(tally.repairs));
+    if (tally.most_cuts) facts.add("cuts of cloth", cuts_text(*tally.most_cuts));
+    facts.add("kinetic energy", number_text(tally.last_stats.kinetic_energy_j()) + " J at the end")
         .add("potential energy",
              number_text(tally.last_stats.potential_energy_j()) + " J at the end")
         .add("at rest", tally.last_stats.at_rest() ? "yes" : "no");

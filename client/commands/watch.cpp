@@ -91,19 +91,17 @@ class Display {
 
   std::vector<std::string> lines() const {
     const v1::FrameStats& stats = last_->stats();
-    std::istringstream text(
-        Facts()
-            .add("frame", std::to_string(last_->number()))
-            .add("simulated time", fmt::format("{:.3f} s", last_->time_s()))
-            .add("kinetic energy", number_text(stats.kinetic_energy_j()) + " J")
-            .add("potential energy", number_text(stats.potential_energy_j()) + " J")
-            .add("largest strain", percent_text(stats.largest_strain()))
-            .add("cuts of cloth", stats.has_cloth_cut_count()
-                                      ? std::to_string(stats.cloth_cut_count())
-                                      : "not counted")
-            .add("speed", fmt::format("{:.2f} x real time", pace_now_))
-            .add("at rest", stats.at_rest() ? "yes" : "no")
-            .text());
+    Facts facts;
+    facts.add("frame", std::to_string(last_->number()))
+        .add("simulated time", fmt::format("{:.3f} s", last_->time_s()))
+        .add("kinetic energy", number_text(stats.kinetic_energy_j()) + " J")
+        .add("potential energy", number_text(stats.potential_energy_j()) + " J")
+        .add("largest strain", percent_text(stats.largest_strain()));
+    if (stats.has_cloth_cut_count())
+      facts.add("cuts of cloth", std::to_string(stats.cloth_cut_count()));
+    facts.add("speed", fmt::format("{:.2f} x real time", pace_now_))
+        .add("at rest", stats.at_rest() ? "yes" : "no");
+    std::istringstream text(facts.text());
     std::vector<std::string> lines;
     for (std::string line; std::getline(text, line);) lines.push_back(line);
     return lines;

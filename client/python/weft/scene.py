@@ -232,6 +232,7 @@ class Sheet(Value):
     pins: Sequence[Pin] = ()
     skin_m: float | None = None
     thickness_m: float | None = None
+    tether_stretch: float | None = None
 
     @classmethod
     def grid(

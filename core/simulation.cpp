@@ -154,6 +154,9 @@ void Simulation::State::forget_motion() {
 bool Simulation::State::keep_to_budget(NextStates& next) {
   if (scene.solver.max_repairs == 0) return true;
   const double begin = time(), frame_step = scene.solver.frame_step;
+  double stored = 0;
+  if (cloth_contact)
+    for (const MovingSheet& sheet : sheets) stored += sheet.budget.stored;
   std::string reason;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const SheetDefinition& definition = scene.sheets[s];
@@ -164,8 +167,8 @@ bool Simulation::State::keep_to_budget(NextStates& next) {
     budget.given += work_of_motion(mesh, drive, budget.stored);
     budget.substeps += plan.step.substeps;
     if (budget.substeps < kAuditSubsteps) continue;
-    const std::string why =
-        audit(mesh, drive, height_of(definition), wind_speed(scene), next[s], budget);
+    const std::string why = audit(mesh, drive, height_of(definition), wind_speed(scene),
+                                  cloth_contact ? stored - budget.stored : 0, next[s], budget);
     if (reason.empty() && !why.empty()) reason = definition.name + ": " + why;
   }
   if (reason.empty()) return true;

@@ -26,7 +26,7 @@ double work_of_motion(const Mesh& mesh, const Drive& drive, double stored) {
          mesh.mass.sum() * (drive.gravity.norm() * way + drive.speed * drive.speed);
 }
 
-std::string audit(const Mesh& mesh, const Drive& drive, double height, double wind,
+std::string audit(const Mesh& mesh, const Drive& drive, double height, double wind, double others,
                   const SheetState& state, EnergyBudget& budget) {
   // shares of what is stored, and of m g h: what readings of fast modes differ by, and rounding
   constexpr double kStoredShare = 0.05, kWeightShare = 1e-6;
@@ -41,7 +41,7 @@ std::string audit(const Mesh& mesh, const Drive& drive, double height, double wi
   budget.most = budget.audits == 0 ? energy : std::max(budget.most, energy);
   if (++budget.audits < kAudits) return {};
 
-  const double given = budget.given + kWindShare * mass * wind * wind;
+  const double given = budget.given + others + kWindShare * mass * wind * wind;
   const double tolerance =
       kStoredShare * budget.stored + kWeightShare * mass * drive.gravity.norm() * height;
   std::string reason;

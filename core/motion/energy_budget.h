@@ -31,9 +31,10 @@ inline constexpr int kAudits = 4;
 // 2 in phase with U, and what brings its mass M to that speed.
 double work_of_motion(const Mesh& mesh, const Drive& drive, double stored);
 
-// Looks at the energy of a sheet after a frame. `height`: of the sheet, m; `wind`: its speed, m/s.
-// Returns why the step is not to be trusted; empty: nothing speaks against it.
-std::string audit(const Mesh& mesh, const Drive& drive, double height, double wind,
+// Looks at the energy of a sheet after a frame. `height`: of the sheet, m; `wind`: its speed, m/s;
+// `others`: what sheets that touch it may have had, J. Returns why the step is not to be trusted;
+// empty: nothing speaks against it.
+std::string audit(const Mesh& mesh, const Drive& drive, double height, double wind, double others,
                   const SheetState& state, EnergyBudget& budget);
 
 }  // namespace weft

@@ -41,7 +41,9 @@ double kinetic_energy(const Mesh& mesh, const Matrix3Xd& v) {
 
 double motion_speed(const Scene& scene, const SheetDefinition& sheet, double begin, double end) {
   double speed = 0;
-  for (const Pin& pin : sheet.pins) speed = std::max(speed, path_speed(pin.path, begin, end));
+  for (const SheetDefinition& each : scene.sheets)
+    if (&each == &sheet || scene.cloth_contact)
+      for (const Pin& pin : each.pins) speed = std::max(speed, path_speed(pin.path, begin, end));
   for (const Collider& collider : scene.colliders)
     speed = std::max(speed, path_speed(collider.path, begin, end));
   return speed;

@@ -42,7 +42,7 @@ struct Cost {
   int frames = 0;
 };
 
-// Frame by frame in turns, so that both meet the same machine; the last `frames` count.
+// Frame by frame in turns, so that both meet the same machine.
 Cost cost_of(const Scene& scene, int frames) {
   Simulation one(scene), other(without_contact(scene));
   Cost cost;
@@ -95,7 +95,7 @@ void cuts(Page& page, bool large) {
   std::vector<Cells> rows;
   for (const ContactScene& each : contact_scenes(large)) {
     Simulation simulation(each.scene);
-    std::int64_t sum = 0, most = 0, last = 0;
+    std::int64_t most = 0, last = 0;
     int frames = 0, with_cuts = 0;
     const double begin = processor_time();
     double longest = 0, passed = 0;
@@ -106,7 +106,6 @@ void cuts(Page& page, bool large) {
       longest = std::max(longest, took);
       passed += took;
       last = cuts_of(simulation);
-      sum += last;
       most = std::max(most, last);
       with_cuts += last > 0 ? 1 : 0;
     }

@@ -15,7 +15,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 
 // As measured, see tests/reports/mesh.cpp.
-Textile wool() {
+Textile cloth_textile() {
   Textile textile;
   textile.model = MeasuredTextile{.areal_density = 0.168,
                                   .tensile_warp = 2133,
@@ -32,7 +32,7 @@ SheetDefinition sheet_of(const std::string& name, const SheetShape& shape) {
   SheetDefinition sheet;
   sheet.name = name;
   sheet.shape = shape;
-  sheet.textile = wool();
+  sheet.textile = cloth_textile();
   sheet.bending = Isometric{};
   return sheet;
 }

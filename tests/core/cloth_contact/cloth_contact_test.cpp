@@ -283,6 +283,28 @@ TEST(ClothContact, ASheetPouredIntoAHeapDoesNotPassThroughItself) {
   EXPECT_LT(positions(simulation).row(1).maxCoeff(), 0.1);
 }
 
+// The energy that it gets is no fault of the step.
+TEST(ClothContact, ASheetThatAnotherDrawsAlongNeedsNoRepair) {
+  SheetDefinition cloth = triangles(0.3, 0.08), napkin = triangles(0.04, 0.04);
+  napkin.name = "napkin";
+  napkin.origin = {0.05, 2e-3, 0.02};
+  const Matrix3Xd x = start_positions(cloth);
+  for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    if (x(0, i) < 0.3 - 1e-9) continue;
+    Pin& pin = cloth.pins.emplace_back();
+    pin.particles = {static_cast<int>(i)};
+    for (int k = 0; k <= 100; ++k) pin.path.push_back({0.01 * k, {0.4 * k * k * 1e-4, 0, 0}});
+  }
+  Scene scene = touching({cloth, napkin});
+  scene.colliders.push_back({"table", Plane{Vector3d(0, -1e-3, 0)}, 0.2, {}});
+  Simulation simulation(scene);
+  const Vector3d before = by_sheet(simulation, positions(simulation))[1].rowwise().mean();
+  for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(simulation.advance_frame());
+  const Vector3d after = by_sheet(simulation, positions(simulation))[1].rowwise().mean();
+  EXPECT_GT((after - before).x(), 0.3);
+  EXPECT_EQ(simulation.repairs().size(), 0u);
+}
+
 TEST(ClothContact, CutsOfAFrameAreAmongItsFacts) {
   SheetDefinition one = triangles(0.1, 0.1), other = lattice(5, 5);
   other.origin = {0.03, -0.02, 0.04};

@@ -251,12 +251,16 @@ Scene stacked(int n) {
 }
 
 std::vector<ContactScene> contact_scenes(bool large) {
-  return {{"stack", "ten sheets of 0.5 m dropped on a ball", stacked(large ? 51 : 31), 1.5},
-          {"heap", "a sheet poured into a heap", poured(large ? 0.5 : 0.3), 1.5},
-          {"twist", "a tube twisted by four turns in 4 s and back", twisted_tube(4, 8), 8.2},
-          {"knot", "a ribbon along a knot that is pulled", knotted(), 2.5},
-          {"cloth pulled", "a cloth drawn from under three napkins", drawn_away(), 1.2},
-          {"layers", "two layers on a ball that moves", two_layers(large ? 51 : 31), 3}};
+  const int n = large ? 51 : 31;
+  const double turns = large ? 4 : 2;
+  return {{"heap", "a sheet is poured into a heap", poured(large ? 0.5 : 0.3), 1.5},
+          {"twist",
+           large ? "a tube is twisted by four turns in 4 s and back"
+                 : "a tube is twisted by two turns in 2 s and back",
+           twisted_tube(turns, 2 * turns), 2 * turns + 0.2},
+          {"knot", "a ribbon along a knot is pulled", knotted(), 2.5},
+          {"cloth pulled", "a cloth is drawn from under three napkins", drawn_away(), 1.2},
+          {"layers", "two layers on a ball that moves", two_layers(n), 3}};
 }
 
 }  // namespace weft::reports

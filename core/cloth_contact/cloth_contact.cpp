@@ -20,6 +20,7 @@ constexpr double kWindowReach = 0.25, kLeastReach = 0.02;
 ClothContact::ClothContact(const Scene& scene)
     : scene_(scene), cloth_(scene.sheets), lists_(cloth_) {
   place_.assign(static_cast<std::size_t>(cloth_.particles()), -1);
+  forget();
 }
 
 void ClothContact::forget() {

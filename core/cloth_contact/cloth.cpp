@@ -141,8 +141,8 @@ Cloth::Cloth(const std::vector<SheetDefinition>& sheets) {
 }
 
 Matrix3Xd Cloth::positions(const std::vector<Matrix3Xd>& x) const {
-  Matrix3Xd all(3, particles());
-  for (std::size_t s = 0; s < x.size(); ++s) all.middleCols(first_particle[s], x[s].cols()) = x[s];
+  Matrix3Xd all;
+  join([&](std::size_t s) -> const Matrix3Xd& { return x[s]; }, all);
   return all;
 }
 

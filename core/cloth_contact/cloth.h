@@ -18,7 +18,15 @@ struct Cloth {
   int own_number(int particle) const {
     return particle - first_particle[static_cast<std::size_t>(sheet_of(particle))];
   }
-  // Positions of all sheets, (3 x particles) m, of those of each.
+  // Puts positions of all sheets together, (3 x particles) m: each(s) -> those of one.
+  template <class Each>
+  void join(const Each& each, Matrix3Xd& all) const {
+    all.resize(3, particles());
+    for (std::size_t s = 0; s + 1 < first_particle.size(); ++s) {
+      const Matrix3Xd& x = each(s);
+      all.middleCols(first_particle[s], x.cols()) = x;
+    }
+  }
   Matrix3Xd positions(const std::vector<Matrix3Xd>& x) const;
 
   std::vector<int> first_particle;  // of each sheet; then how many there are

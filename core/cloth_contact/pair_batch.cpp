@@ -86,7 +86,7 @@ void solve_edges(const PairBatch::Planes& planes) {
         hn::IfThenElse(hn::Gt(sine, hn::Mul(of(kParallel), both)),
                        share(hn::NegMulAdd(vv, uw, hn::Mul(uv, vw)), sine), of(0.5));
     const Values t = share(hn::MulAdd(first, uv, vw), vv);
-    const Values s = share(hn::NegMulAdd(one, uw, hn::Mul(t, uv)), uu);
+    const Values s = share(hn::Sub(hn::Mul(t, uv), uw), uu);
     hn::Store(hn::Sub(one, s), tag, planes.weights[0] + at);
     hn::Store(s, tag, planes.weights[1] + at);
     hn::Store(hn::Sub(t, one), tag, planes.weights[2] + at);

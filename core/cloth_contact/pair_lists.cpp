@@ -72,10 +72,11 @@ double PairLists::motion(const BlockPair& blocks) const {
   return moved < most ? moved : most;
 }
 
-// Positions of the particles of both blocks.
+// Positions of the particles of both blocks, or of the one.
 void PairLists::place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const {
   const std::span<const int> one = blocks_.particles(blocks.one),
-                             other = blocks_.particles(blocks.other);
+                             other = blocks.one == blocks.other ? std::span<const int>()
+                                                                : blocks_.particles(blocks.other);
   at.resize(3, static_cast<Eigen::Index>(one.size() + other.size()));
   Eigen::Index n = 0;
   for (const int i : one) at.col(n++) = x.col(i);
@@ -87,11 +88,14 @@ void PairLists::place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at
 double PairLists::change(const Matrix3Xd& x, const List& list) {
   place(x, list.blocks, now_);
   const Eigen::Index last = now_.cols() - 1, half = last / 2;
-  const auto frame = [&](const Matrix3Xd& at) {
+  // any that turns with the cloth
+  const auto frame = [&](const Matrix3Xd& at) -> Eigen::Matrix3d {
+    constexpr double kOnALine = 1e-3;  // sine
+    const Vector3d a = at.col(last) - at.col(0), b = at.col(half) - at.col(0), out = a.cross(b);
+    if (!(out.norm() > kOnALine * a.norm() * b.norm())) return Eigen::Matrix3d::Identity();
     Eigen::Matrix3d axes;
-    const Vector3d a = at.col(last) - at.col(0), b = at.col(half) - at.col(0);
     axes.col(0) = a.normalized();
-    axes.col(2) = a.cross(b).normalized();
+    axes.col(2) = out.normalized();
     axes.col(1) = axes.col(2).cross(axes.col(0));
     return axes;
   };

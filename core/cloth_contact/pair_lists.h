@@ -20,12 +20,12 @@ class PairLists {
   NearBlocks& blocks() { return blocks_; }
   // How far particles may move in relation to each other until lists are looked at again, m.
   double lasts() const { return lasts_; }
+  // Of the thickest cloth; pairs that came farther since the last update may be missed.
+  static constexpr double kMostMotion = 8;
   // Cloth is at x now, (3 x particles) m, and may come as far as `step` (m) in a step in relation
   // to anything else. Has the lists hold every pair that is nearer than its thickness and `margin`
   // (m), or was since the last update, or will be as long as nothing moves farther than lasts()
-  // less the margin in relation to anything else. Pairs that came farther than kMostMotion may be
-  // missed. Whether other pairs are near than before.
-  static constexpr double kMostMotion = 8;  // of the thickest cloth
+  // less the margin in relation to anything else. Whether other pairs are near than before.
   bool update(const Matrix3Xd& x, double margin, double step);
 
   // Calls f(pairs) for every list, in an order that depends on the blocks alone.

@@ -136,7 +136,7 @@ TEST(ClothContact, ASheetComesToLieOnAnotherAtItsThickness) {
 }
 
 // Bit for bit, with the solvers that vectors have and with plain ones.
-TEST(ClothContact, MissesNoPairThatAPlainSearchOfAllInEverySubstepFinds) {
+TEST(ClothContact, MissesNoPairThatAPlainSearchOfAllFinds) {
   for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
     for (const unsigned seed : {1U, 10U}) {
       SCOPED_TRACE(seed);

@@ -6,11 +6,9 @@
 #include <ctime>
 #include <iostream>
 
-#include "core/cloth_contact/cuts.h"
 #include "core/simulation.h"
 #include "tests/reports/contact_scenes.h"
 #include "tests/reports/report.h"
-#include "tests/support/core/scenes.h"
 
 namespace weft::reports {
 namespace {
@@ -18,17 +16,6 @@ namespace {
 using Cells = std::vector<std::string>;
 
 double processor_time() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-std::int64_t cuts_of(const Simulation& simulation) {
-  const Matrix3Xd all = testing::positions(simulation);
-  std::vector<Matrix3Xd> x;
-  Eigen::Index first = 0;
-  for (const SheetDefinition& sheet : simulation.scene().sheets) {
-    x.emplace_back(all.middleCols(first, sheet.particle_count()));
-    first += sheet.particle_count();
-  }
-  return count_cuts(simulation.scene().sheets, x, 0).count;
-}
 
 Scene without_contact(Scene scene) {
   scene.cloth_contact = false;
@@ -39,7 +26,6 @@ Scene without_contact(Scene scene) {
 struct Cost {
   double with = 0, without = 0, longest = 0;  // s of processor time; of a frame
   std::int64_t cuts = 0;
-  int frames = 0;
 };
 
 // Frame by frame in turns, so that both meet the same machine.
@@ -54,8 +40,7 @@ Cost cost_of(const Scene& scene, int frames) {
     cost.with += middle - begin;
     cost.longest = std::max(cost.longest, middle - begin);
     cost.without += processor_time() - middle;
-    cost.cuts += cuts_of(one);
-    ++cost.frames;
+    cost.cuts += *one.stats().cloth_cuts;
   }
   return cost;
 }
@@ -105,7 +90,7 @@ void cuts(Page& page, bool large) {
       const double took = processor_time() - before;
       longest = std::max(longest, took);
       passed += took;
-      last = cuts_of(simulation);
+      last = *simulation.stats().cloth_cuts;
       most = std::max(most, last);
       with_cuts += last > 0 ? 1 : 0;
     }

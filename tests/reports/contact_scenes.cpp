@@ -6,6 +6,7 @@
 
 #include "core/contact/body.h"
 #include "core/triangles/cut.h"
+#include "tests/reports/trial.h"
 #include "tests/support/core/bodies.h"
 #include "tests/support/core/scenes.h"
 
@@ -14,25 +15,13 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// As measured, see tests/reports/mesh.cpp.
-Textile cloth_textile() {
-  Textile textile;
-  textile.model = MeasuredTextile{.areal_density = 0.168,
-                                  .tensile_warp = 2133,
-                                  .tensile_weft = 1671,
-                                  .shear = 26.17,
-                                  .bend_rigidity_warp = 5.56e-6,
-                                  .bend_rigidity_weft = 5.02e-6};
-  textile.damping = 2e-5;
-  textile.friction = 0.3;
-  return textile;
-}
-
 SheetDefinition sheet_of(const std::string& name, const SheetShape& shape) {
   SheetDefinition sheet;
   sheet.name = name;
   sheet.shape = shape;
-  sheet.textile = cloth_textile();
+  MeasuredTextile wool = kWool;
+  wool.air_drag = 0;
+  sheet.textile = {wool, 2e-5, 0.3};
   sheet.bending = Isometric{};
   return sheet;
 }
@@ -63,15 +52,15 @@ Collider ball(double radius) {
 
 // Every particle of which `held` says so follows way(its start, time).
 void lead(SheetDefinition& sheet, const std::function<bool(const Vector3d&)>& held,
-          const std::function<Vector3d(const Vector3d&, double)>& way, double seconds,
-          double key_step = 0.01) {
+          const std::function<Vector3d(const Vector3d&, double)>& way, double seconds) {
+  constexpr double kKeyStep = 0.01;  // s
   const Matrix3Xd x = start_positions(sheet);
   for (Eigen::Index i = 0; i < x.cols(); ++i) {
     const Vector3d start = x.col(i);
     if (!held(start)) continue;
     Pin& pin = sheet.pins.emplace_back();
     pin.particles = {static_cast<int>(i)};
-    const int keys = static_cast<int>(std::lround(seconds / key_step));
+    const int keys = static_cast<int>(std::lround(seconds / kKeyStep));
     for (int k = 0; k <= keys; ++k)
       pin.path.push_back({seconds * k / keys, way(start, seconds * k / keys) - start});
   }
@@ -161,7 +150,6 @@ Scene knotted() {
   start_at(ribbon, [&](const Vector3d& x) {
     const double s = at(x.x()), e = 1e-3;
     const Vector3d along = (curve(s + e) - curve(s - e)).normalized();
-    // upright, so that it crosses over itself edgewise nowhere
     const Vector3d across = along.cross(Vector3d::UnitY()).normalized();
     return Vector3d(scale * curve(s) + (x.z() - kWidth / 2) * across);
   });
@@ -187,8 +175,7 @@ Scene drawn_away() {
   std::vector<SheetDefinition> sheets;
   lead(
       cloth, [](const Vector3d& x) { return x.x() > 0.6 - 1e-9; },
-      [](const Vector3d& x, double t) { return Vector3d(x + Vector3d(0.8 * t * t / 2 * 2, 0, 0)); },
-      1.0);
+      [](const Vector3d& x, double t) { return Vector3d(x + Vector3d(0.8 * t * t, 0, 0)); }, 1.0);
   sheets.push_back(cloth);
   for (int k = 0; k < 3; ++k) {
     SheetDefinition napkin = rectangle("napkin " + std::to_string(k + 1), 0.1, 0.1, 0.01);

@@ -15,6 +15,7 @@
 #include "core/triangles/fit.h"
 #include "core/triangles/triangles.h"
 #include "tests/reports/report.h"
+#include "tests/reports/trial.h"
 #include "tests/support/core/scenes.h"
 #include "tests/support/core/triangle_meshes.h"
 
@@ -31,13 +32,9 @@ std::string name_of(const std::optional<Cut>& cut) {
 }
 
 MeasuredTextile wool() {
-  return {.areal_density = 0.168,
-          .tensile_warp = 2133,
-          .tensile_weft = 1671,
-          .shear = 26.17,
-          .bend_rigidity_warp = 5.56e-6,
-          .bend_rigidity_weft = 5.02e-6,
-          .air_drag = 0};
+  MeasuredTextile textile = kWool;
+  textile.air_drag = 0;
+  return textile;
 }
 
 SheetDefinition sheet_of(const SheetShape& shape) {

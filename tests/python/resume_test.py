@@ -37,9 +37,10 @@ class Resume(unittest.TestCase):
         for (number, found), expected in zip(frames, self.expected):
             self.assertEqual(found, expected, f"frame {number}")
 
-    def test_through_kills_of_the_server(self):
-        with weft.connect(self.weftd.address) as server:
+    def read(self, address, interrupt):
+        with weft.connect(address) as server:
             session = server.create_session(hung())
+            interrupt()
             session.step(30)
             session.set_textile(DENIM, over=2)
             session.run(until_frame=LAST, time_scale=4)
@@ -47,8 +48,11 @@ class Resume(unittest.TestCase):
             for frame in session.frames():
                 frames.append((frame.number, frame.positions.tobytes()))
                 if frame.number in KILLS:
-                    self.weftd.kill_and_start()
-        self.check(frames)
+                    interrupt()
+        return frames
+
+    def test_through_kills_of_the_server(self):
+        self.check(self.read(self.weftd.address, self.weftd.kill_and_start))
 
     def test_awaited_through_kills_of_the_server(self):
         async def read():
@@ -69,18 +73,7 @@ class Resume(unittest.TestCase):
     def test_through_broken_connections(self):
         proxy = Proxy(self.weftd.address)
         self.addCleanup(proxy.close)
-        with weft.connect(proxy.address) as server:
-            session = server.create_session(hung())
-            proxy.drop()
-            session.step(30)
-            session.set_textile(DENIM, over=2)
-            session.run(until_frame=LAST, time_scale=4)
-            frames = []
-            for frame in session.frames():
-                frames.append((frame.number, frame.positions.tobytes()))
-                if frame.number in KILLS:
-                    proxy.drop()
-        self.check(frames)
+        self.check(self.read(proxy.address, proxy.drop))
 
     def test_calls_are_carried_out_once(self):
         with weft.connect(self.weftd.address) as server:

@@ -106,6 +106,15 @@ class Server:
                 pause = attempts.pause(cause)
             await asyncio.sleep(pause)
 
+    async def _all(self, request: Any, field: str) -> list[Any]:
+        found: list[Any] = []
+        while True:
+            page = await self.call(request)
+            found.extend(getattr(page, field))
+            request.page_token = page.next_page_token
+            if not request.page_token:
+                return found
+
     async def check(self, scene: Scene) -> session_pb2.Session:
         return await self._create(scene, "", True)
 
@@ -132,14 +141,7 @@ class Server:
         return Session(self, await self.call(request))
 
     async def sessions(self) -> list[session_pb2.Session]:
-        found: list[session_pb2.Session] = []
-        token = ""
-        while True:
-            page = await self.call(session_pb2.ListSessionsRequest(page_token=token))
-            found.extend(page.sessions)
-            token = page.next_page_token
-            if not token:
-                return found
+        return await self._all(session_pb2.ListSessionsRequest(), "sessions")
 
     async def restore(self, snapshot: str, session_id: str = "") -> "Session":
         request = session_pb2.RestoreSessionRequest(name=snapshot, session_id=session_id)
@@ -219,14 +221,7 @@ class Server:
         return asset
 
     async def assets(self) -> list[asset_pb2.Asset]:
-        found: list[asset_pb2.Asset] = []
-        token = ""
-        while True:
-            page = await self.call(asset_pb2.ListAssetsRequest(page_token=token))
-            found.extend(page.assets)
-            token = page.next_page_token
-            if not token:
-                return found
+        return await self._all(asset_pb2.ListAssetsRequest(), "assets")
 
     async def delete_asset(self, name: str, allow_missing: bool = False) -> None:
         await self.call(asset_pb2.DeleteAssetRequest(name=name, allow_missing=allow_missing))

@@ -117,6 +117,15 @@ class Server:
                 pause = attempts.pause(cause)
             time.sleep(pause)
 
+    def _all(self, request: Any, field: str) -> list[Any]:
+        found: list[Any] = []
+        while True:
+            page = self.call(request)
+            found.extend(getattr(page, field))
+            request.page_token = page.next_page_token
+            if not request.page_token:
+                return found
+
     # sessions
 
     def check(self, scene: Scene) -> session_pb2.Session:
@@ -153,14 +162,7 @@ class Server:
 
     def sessions(self) -> list[session_pb2.Session]:
         """All sessions in order of name."""
-        found: list[session_pb2.Session] = []
-        token = ""
-        while True:
-            page = self.call(session_pb2.ListSessionsRequest(page_token=token))
-            found.extend(page.sessions)
-            token = page.next_page_token
-            if not token:
-                return found
+        return self._all(session_pb2.ListSessionsRequest(), "sessions")
 
     def restore(self, snapshot: str, session_id: str = "") -> "Session":
         """A session that goes on from "sessions/{session}/snapshots/{snapshot}"."""
@@ -250,14 +252,7 @@ class Server:
 
     def assets(self) -> list[asset_pb2.Asset]:
         """One's assets in order of name."""
-        found: list[asset_pb2.Asset] = []
-        token = ""
-        while True:
-            page = self.call(asset_pb2.ListAssetsRequest(page_token=token))
-            found.extend(page.assets)
-            token = page.next_page_token
-            if not token:
-                return found
+        return self._all(asset_pb2.ListAssetsRequest(), "assets")
 
     def delete_asset(self, name: str, allow_missing: bool = False) -> None:
         """Forgets an asset that no session names."""

@@ -2,6 +2,8 @@
 #include <signal.h>
 
 #include <atomic>
+#include <filesystem>
+#include <future>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -55,6 +57,19 @@ class RestartedWeftd : public ClientTest {
     start();
   }
   std::string address() const { return host_ + ":" + port_; }
+
+  // Records the session "cloth" into cloth.weft. When this returns, the recorder has its
+  // connection: a command that finds no server when it starts gives up.
+  std::future<Outcome> record_until(std::int64_t last) const {
+    auto recorded = std::async(std::launch::async, [this, last] {
+      return run_weft({"record", "cloth", "--from", "0", "--to", std::to_string(last), "--encoding",
+                       "float64", "-o", path("cloth.weft"), "--server", address(), "--json"});
+    });
+    while (!std::filesystem::exists(path("cloth.weft")) &&
+           recorded.wait_for(std::chrono::milliseconds(1)) == std::future_status::timeout) {
+    }
+    return recorded;
+  }
 
   std::shared_ptr<Sessions> stub() {
     std::lock_guard lock(mutex_);
@@ -179,12 +194,7 @@ TEST_F(RestartedWeftd, KilledAtRandomMomentsLosesNoCallAndNoFrame) {
   kill_and_start();
   EXPECT_EQ(insist(current, &Sessions::CreateSession, create).uid(), session.uid());
 
-  Outcome recorded;
-  std::jthread recorder([&] {
-    recorded =
-        run_weft({"record", "cloth", "--from", "0", "--to", std::to_string(last), "--encoding",
-                  "float64", "-o", path("cloth.weft"), "--server", address(), "--json"});
-  });
+  std::future<Outcome> recorder = record_until(last);
   std::atomic<int> answered = 0;
   std::jthread caller([&] { carry_out(history, session, current, answered); });
   for (int i = 1; i <= kKills; ++i) {
@@ -195,7 +205,7 @@ TEST_F(RestartedWeftd, KilledAtRandomMomentsLosesNoCallAndNoFrame) {
     kill_and_start();
   }
   caller.join();
-  recorder.join();
+  const Outcome recorded = recorder.get();
   ASSERT_EQ(recorded.exit, 0) << recorded.err;
 
   // the same history without kills
@@ -232,12 +242,7 @@ TEST_F(RestartedWeftd, KilledInARunChangesNoFrameThatWasSeen) {
     return request;
   };
 
-  Outcome recorded;
-  std::jthread recorder([&] {
-    recorded =
-        run_weft({"record", "cloth", "--from", "0", "--to", std::to_string(kFrames), "--encoding",
-                  "float64", "-o", path("cloth.weft"), "--server", address(), "--json"});
-  });
+  std::future<Outcome> recorder = record_until(kFrames);
   v1::RunSessionRequest run;
   run.set_name(session.name());
   run.set_until_frame(kFrames);
@@ -261,7 +266,7 @@ TEST_F(RestartedWeftd, KilledInARunChangesNoFrameThatWasSeen) {
     kill_and_start();
   }
   caller.join();
-  recorder.join();
+  const Outcome recorded = recorder.get();
   ASSERT_EQ(recorded.exit, 0) << recorded.err;
 
   const v1::Session undisturbed = service_.create(small_scene(), "undisturbed");

@@ -15,15 +15,28 @@ void MovingSheet::set_definition(const Scene& scene, const SheetDefinition& defi
   else if (!definition.textile.damping)
     made.damping = std::max(kDefaultDamping, damping_of(definition, made, kSafeDampingRatio));
   set_mesh(scene, definition, std::move(made));
-  dynamics.gravity = scene.environment.gravity;
   skin = definition.skin_or_default();
 }
 
 void MovingSheet::set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made) {
   mesh = std::move(made);
+  if (dressing.ease < 1) ease_rest_shape(definition, dressing.ease, mesh);
   if (!scene.environment.wind) mesh.triangles = std::vector<std::array<int, 3>>();
   set_pins(definition);
   dynamics.drag = mesh.drag;
+  if (dressing.drag > 0) {
+    if (dynamics.drag.size() == 0) dynamics.drag = VectorXd::Zero(mesh.mass.size());
+    dynamics.drag += dressing.drag * mesh.mass;
+  }
+  dynamics.gravity = dressing.weight * scene.environment.gravity;
+}
+
+void MovingSheet::dress(const Scene& scene, const SheetDefinition& definition,
+                        const DressingState& state) {
+  Mesh made = make_mesh(definition);
+  made.damping = mesh.damping;  // costs more to find than all else
+  dressing = state;
+  set_mesh(scene, definition, std::move(made));
 }
 
 void MovingSheet::release_memory() {
@@ -37,9 +50,7 @@ void MovingSheet::release_memory() {
 }
 
 void MovingSheet::restore_memory(const Scene& scene, const SheetDefinition& definition) {
-  Mesh made = make_mesh(definition);
-  made.damping = mesh.damping;  // costs more to find than all else
-  set_mesh(scene, definition, std::move(made));
+  dress(scene, definition, dressing);
   solver->restore_memory();
 }
 
@@ -68,8 +79,8 @@ double height_of(const SheetDefinition& sheet) {
   return std::max(warp, weft) * sheet.spacing();
 }
 
-double end_of_paths(const Scene& scene) {
-  double end = 0;
+double end_of_motion(const Scene& scene) {
+  double end = scene.dressing ? scene.dressing->end() : 0;
   const auto include = [&](const Path& path) {
     if (!path.empty()) end = std::max(end, path.back().time);
   };

@@ -20,11 +20,14 @@ struct MovingSheet {
   std::unique_ptr<SheetSolver> solver;
   double skin = 0;  // m
   double most_strain = kMostStrain;
+  DressingState dressing;
   EnergyBudget budget;
   std::optional<TextileRamp> ramp;
 
   // Mesh, forces and skin of a definition: its textile as it is simulated, and its pins.
   void set_definition(const Scene& scene, const SheetDefinition& definition);
+  // Mesh and forces as they are while the sheet is put on.
+  void dress(const Scene& scene, const SheetDefinition& definition, const DressingState& state);
   // Lets go of what follows from the definition, but for its damping, until it is restored by the
   // same.
   void release_memory();
@@ -49,6 +52,7 @@ struct MovingSheet {
   }
 
  private:
+  // Takes what `dressing` says into account.
   void set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made);
 
   mutable SheetState good_;  // empty: not looked at since
@@ -57,8 +61,8 @@ struct MovingSheet {
 // From which a sheet may fall within itself, m.
 double height_of(const SheetDefinition& sheet);
 
-// When the last path ends, s.
-double end_of_paths(const Scene& scene);
+// When the last path and the dressing end, s.
+double end_of_motion(const Scene& scene);
 
 // Held particles follow the paths of their pins in the step of dt that ends at `time`.
 void move_pins(const std::vector<Pin>& pins, double time, double dt, MovingSheet& sheet);

@@ -19,7 +19,7 @@ struct Repair {
 
 // What the guard says of an attempt at a frame.
 struct Attempt {
-  std::vector<Verdict> sheets;
+  std::vector<Inspection> sheets;
   std::string reason;  // the first of theirs; empty: the frame is good
 
   // Whether every sheet that is in doubt does here as it did there.

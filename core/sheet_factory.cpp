@@ -7,6 +7,7 @@
 #include "core/lattice/sample.h"
 #include "core/lattice/solver.h"
 #include "core/lattice/tethers.h"
+#include "core/triangles/ease.h"
 #include "core/triangles/geodesics.h"
 #include "core/triangles/solver.h"
 #include "core/triangles/triangles.h"
@@ -15,6 +16,10 @@ namespace weft {
 
 Mesh make_mesh(const SheetDefinition& sheet) {
   return std::holds_alternative<Grid>(sheet.shape) ? make_lattice(sheet) : make_triangles(sheet);
+}
+
+void ease_rest_shape(const SheetDefinition& sheet, double share, Mesh& mesh) {
+  if (std::holds_alternative<Triangles>(sheet.shape)) ease(sheet, share, mesh);
 }
 
 StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,

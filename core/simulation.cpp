@@ -69,14 +69,42 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
     move_pins(definition.pins, time + dt, dt, sheet);
     if (!sheet.dynamics.tethers.empty()) sheet.solver->pull_back(pool);
   }
+  if (scene.dressing) hold_heights(time + dt);
   if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame);
 
   // colliders last, so that no particle ends a step inside one
   if (scene.colliders.empty()) return;
+  double deflate = 0, growth = 0;
+  if (scene.dressing) {
+    deflate = dressing_at(*scene.dressing, time + dt).deflate;
+    growth = dressing_at(*scene.dressing, time).deflate - deflate;
+  }
   for (std::size_t s = 0; s < sheets.size(); ++s)
-    sheets[s].solver->resolve(
-        Contacts(scene.colliders, scene.sheets[s].textile.friction, sheets[s].skin, time + dt, dt),
-        pool);
+    sheets[s].solver->resolve(Contacts(scene.colliders, scene.sheets[s].textile.friction,
+                                       sheets[s].skin, time + dt, dt, deflate, growth),
+                              pool);
+}
+
+// Particles on hold go back to the height they started at, and on without moving up or down.
+void Simulation::State::hold_heights(double time) {
+  for (const Hold& hold : scene.dressing->holds) {
+    if (time > scene.dressing->close + hold.until) continue;
+    MovingSheet& sheet = sheets[static_cast<std::size_t>(hold.sheet)];
+    const Vector3d& gravity = scene.environment.gravity;
+    const Vector3d up = gravity.isZero() ? Vector3d(Vector3d::UnitY()) : -gravity.normalized();
+    std::vector<int> particles;
+    for (const int i : hold.particles)
+      if (sheet.dynamics.inverse_mass[i] > 0) particles.push_back(i);
+    const auto count = static_cast<Eigen::Index>(particles.size());
+    if (count == 0) continue;
+    Matrix3Xd x(3, count), d(3, count);
+    sheet.solver->read(particles, x, d);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      x.col(k) = (sheet.start(particles[static_cast<std::size_t>(k)]) - x.col(k)).dot(up) * up;
+      d.col(k) = -d.col(k).dot(up) * up;
+    }
+    sheet.solver->displace(particles, x, d);
+  }
 }
 
 // False: the frame cannot be computed.
@@ -85,7 +113,7 @@ bool Simulation::State::begin_frame(bool in_parts) {
   constexpr std::int64_t kWorthSaving = 1000;
   std::optional<Snapshot> before;
   if (in_parts && plan.step.substeps >= kWorthSaving) before = snapshot();
-  if (!change_textiles()) return false;
+  if (!change_dressing() || !change_textiles()) return false;
   for (const MovingSheet& sheet : sheets) sheet.good();  // to go back to, and to show
   repairs.begin_frame();
   unfinished = {0, std::move(before)};
@@ -99,7 +127,7 @@ Attempt Simulation::State::inspect_sheets(NextStates& next) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     MovingSheet& sheet = sheets[s];
     sheet.read(next[s]);
-    const Drive drive{scene.environment.gravity,
+    const Drive drive{sheet.dynamics.gravity,
                       drive_speed(scene, scene.sheets[s], begin, begin + scene.solver.frame_step),
                       scene.solver.frame_step};
     made.sheets.push_back(
@@ -162,7 +190,7 @@ bool Simulation::State::keep_to_budget(NextStates& next) {
     const SheetDefinition& definition = scene.sheets[s];
     const Mesh& mesh = sheets[s].mesh;
     EnergyBudget& budget = sheets[s].budget;
-    const Drive drive{scene.environment.gravity,
+    const Drive drive{sheets[s].dynamics.gravity,
                       motion_speed(scene, definition, begin, begin + frame_step), frame_step};
     budget.given += work_of_motion(mesh, drive, budget.stored);
     budget.substeps += plan.step.substeps;
@@ -215,11 +243,12 @@ Simulation::State::State(Scene given, SolverFactory factory)
     : scene(std::move(given)),
       make_solver(std::move(factory)),
       sheets(scene.sheets.begin(), scene.sheets.end()),
-      rest_after(end_of_paths(scene)),
+      rest_after(end_of_motion(scene)),
       repairs(scene.solver) {
   std::vector<Matrix3Xd> x(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const SheetDefinition definition = capped(s);
+    if (scene.dressing) sheets[s].dressing = dressing_at(*scene.dressing, 0);
     sheets[s].set_definition(scene, definition);
     sheets[s].bind_forces(scene);
     x[s] = start_positions(definition);
@@ -380,6 +409,11 @@ void Simulation::copy_velocities(std::span<double> out) const {
     copy_planes(sheet.good().v, first, out);
     first += sheet.good().v.cols();
   }
+}
+
+Verdict Simulation::verdict() const {
+  state_->restore_memory();
+  return judge(state_->scene, state_->sheets, time(), at_rest());
 }
 
 FrameStats Simulation::stats() const {

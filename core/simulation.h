@@ -13,6 +13,7 @@
 #include "core/plan.h"
 #include "core/sheet_factory.h"
 #include "core/snapshot.h"
+#include "core/verdict.h"
 
 namespace weft {
 
@@ -83,6 +84,8 @@ class Simulation {
   void copy_positions(std::span<double> out) const;   // m
   void copy_velocities(std::span<double> out) const;  // m/s
   FrameStats stats() const;
+  // How the sheets sit, which takes about as long as some substeps.
+  Verdict verdict() const;
 
   // Changes the textile of a sheet between frames: positions and velocities stay, the step is
   // planned anew. Over `duration`, s, the textile changes with every frame, from what it is now, in

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "core/motion/stability.h"
 #include "core/simulation_state.h"
 
 namespace weft {
@@ -95,6 +96,54 @@ bool Simulation::State::change_textiles() {
   return true;
 }
 
+// Gives sheets what the dressing makes of them in the frame to come; false: they do not bear it.
+bool Simulation::State::change_dressing() {
+  if (!scene.dressing) return true;
+  const DressingState next = dressing_at(*scene.dressing, time() + scene.solver.frame_step);
+  if (next == sheets.front().dressing) return true;
+  const double dt = plan.step.substep;
+  const SheetStates before = closing_states();
+  dress(next);
+  if (next == DressingState())
+    plan = plan_now();
+  else
+    shorten_step();
+  if (const auto refused = refusal_of(plan.step)) {
+    failure = "frame " + std::to_string(frame + 1) +
+              " cannot be computed: once dressed, the sheets need " +
+              std::to_string(refused->substeps) + " substeps; at most " +
+              std::to_string(refused->most_substeps) + " are computed";
+    return false;
+  }
+  restart(before, dt, std::vector<bool>(sheets.size(), true));
+  rest.disturb();
+  return true;
+}
+
+void Simulation::State::dress(const DressingState& state) {
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    sheets[s].dress(scene, capped(s), state);
+    sheets[s].solver = make_solver(scene, simulated(s), sheets[s].mesh, sheets[s].dynamics);
+  }
+}
+
+// To what sheets of triangles bear as they are, where no step is asked for.
+void Simulation::State::shorten_step() {
+  if (scene.solver.substep) return;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const MovingSheet& sheet = sheets[s];
+    if (sheet.mesh.surface.membrane.empty()) continue;
+    StepPlan& step = plan.step;
+    const double bound = linear_bound(sheet.mesh, sheet.dynamics.inverse_mass,
+                                      scene.solver.integrator, 0, sheet.good().x);
+    const double longest = scene.solver.safety * bound;
+    if (step.substep <= longest) continue;
+    step.substeps = static_cast<std::int64_t>(std::ceil(scene.solver.frame_step / longest));
+    step.substep = scene.solver.frame_step / static_cast<double>(step.substeps);
+    step.linear_bound = std::min(step.linear_bound, bound);
+  }
+}
+
 std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Textile& textile,
                                                    double duration) {
   State& state = *state_;
@@ -140,7 +189,7 @@ void Simulation::State::adopt(Constraints constraints) {
   for (std::size_t c = 0; c < scene.colliders.size(); ++c)
     scene.colliders[c].path = std::move(constraints.paths[c]);
   grips = std::move(constraints.grips);
-  rest_after = end_of_paths(scene);
+  rest_after = end_of_motion(scene);
 }
 
 ActionContext Simulation::State::action_context() const {

@@ -62,6 +62,10 @@ bool Simulation::State::adopt(const Snapshot& snapshot) {
   repairs.adopt(snapshot.halvings, snapshot.repairs);
   plan = snapshot.plan;
   grips = snapshot.constraints.grips;
+  if (scene.dressing)
+    if (const DressingState then = dressing_at(*scene.dressing, time());
+        then != sheets.front().dressing)
+      dress(then);
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     MovingSheet& sheet = sheets[s];
     const Snapshot::Sheet& saved = snapshot.sheets[s];

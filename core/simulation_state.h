@@ -64,6 +64,7 @@ struct Simulation::State {
   bool begin_frame(bool in_parts);
   bool take_substeps(const Enough& enough, ThreadPool& pool);
   void step(double time, double dt, bool ends_frame, ThreadPool& pool);
+  void hold_heights(double time);
   Attempt inspect_sheets(NextStates& next);
   Decision repair(const Attempt& made, NextStates& next);
   void restart_from(NextStates& next);
@@ -76,6 +77,9 @@ struct Simulation::State {
   void put_textile(std::size_t sheet, const Textile& textile);
   std::optional<StepRefusal> set_textile(std::size_t sheet, const Textile& textile);
   bool change_textiles();
+  bool change_dressing();
+  void dress(const DressingState& state);
+  void shorten_step();
   Constraints constraints() const;
   ActionContext action_context() const;
   void adopt(Constraints constraints);

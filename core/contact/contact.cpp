@@ -20,6 +20,7 @@ Distance distance_at(const Collider& collider, const Vector3d& offset, const Vec
 }
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kLeastThickness = 1e-3;  // of what is left of a deflated body, m
 
 // Where a body is thinnest, m.
 double thickness(const Plane&) { return kInfinite; }
@@ -111,22 +112,24 @@ Distance distance(const Collider& collider, const Vector3d& point, double time) 
 }
 
 Contacts::Contacts(std::span<const Collider> colliders, double friction, double skin, double time,
-                   double dt)
-    : skin_(skin), thinnest_(kInfinite) {
+                   double dt, double deflate, double growth)
+    : skin_(skin - deflate), thinnest_(kInfinite) {
   placed_.reserve(colliders.size());
   for (const Collider& collider : colliders) {
     const Vector3d offset = offset_at(collider.path, time);
     const Vector3d carried = offset - offset_at(collider.path, time - dt);
     const auto* box = std::get_if<Box>(&collider.shape);
+    const double thick =
+        std::visit([](const auto& shape) { return thickness(shape); }, collider.shape) + 2 * skin_;
     const bool of_triangles = std::holds_alternative<SharedBody>(collider.shape);
-    placed_.push_back(
-        {collider,
-         box != nullptr ? box->rotation.normalized().toRotationMatrix()
-                        : Eigen::Matrix3d::Identity().eval(),
-         offset, carried, std::sqrt(friction * collider.friction),
-         std::visit([](const auto& shape) { return thickness(shape); }, collider.shape) + 2 * skin,
-         of_triangles ? DistanceGrid::kSteepest : 1, of_triangles ? kOutward * dt : kInfinite});
-    reach_ = std::max(reach_, carried.norm());
+    placed_.push_back({collider,
+                       box != nullptr ? box->rotation.normalized().toRotationMatrix()
+                                      : Eigen::Matrix3d::Identity().eval(),
+                       offset, carried, std::sqrt(friction * collider.friction),
+                       deflate > 0 ? std::max(thick, kLeastThickness) : thick,
+                       of_triangles ? DistanceGrid::kSteepest : 1,
+                       of_triangles ? kOutward * dt : kInfinite});
+    reach_ = std::max(reach_, carried.norm() + growth);
     thinnest_ = std::min(thinnest_, placed_.back().thickness);
   }
 }

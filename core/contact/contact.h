@@ -26,9 +26,10 @@ Distance distance(const Collider& collider, const Vector3d& point, double time);
 // The colliders of a scene during one step, as a sheet meets them.
 class Contacts {
  public:
-  // friction: of the textile; skin: m; from `time` - dt to `time`, s.
+  // friction: of the textile; skin: m; from `time` - dt to `time`, s. Colliders are smaller all
+  // around by `deflate` (m), and grow by `growth` (m) in the step.
   Contacts(std::span<const Collider> colliders, double friction, double skin, double time,
-           double dt);
+           double dt, double deflate = 0, double growth = 0);
 
   // A collider where it is at the end of the step.
   struct Placed {
@@ -42,6 +43,7 @@ class Contacts {
     double creep;          // how far what began in it is pushed out in the step, m
   };
   std::span<const Placed> placed() const { return placed_; }
+  // Of the textile, from colliders as they are given: less than nothing where they are deflated.
   double skin() const { return skin_; }
   // A body may push a particle into another one: so many rounds at most, until one moves it by no
   // more than kNothing (m).

@@ -173,6 +173,18 @@ void check_triangles(const SheetDefinition& sheet, const std::string& field, Che
   }
 }
 
+// Each of the sheet, and in `taken` once: `how`.
+void check_particles(const std::vector<int>& particles, int count, const std::string& field,
+                     const char* if_none, const char* how, std::set<int>& taken, Check& check) {
+  if (particles.empty()) check.problem(field, std::string("is empty; ") + if_none);
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    const std::string particle = at(field, k);
+    if (check.number(particle, particles[k], 0, count - 1, "") &&
+        !taken.insert(particles[k]).second)
+      check.problem(particle, std::to_string(particles[k]) + " is " + how + " twice");
+  }
+}
+
 void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& check) {
   const bool sized =
       std::visit([&](const auto& shape) { return check_shape(shape, field, check); }, sheet.shape);
@@ -209,15 +221,8 @@ void check_sheet(const SheetDefinition& sheet, const std::string& field, Check& 
   std::set<int> pinned;
   for (std::size_t p = 0; p < sheet.pins.size(); ++p) {
     const std::string pin = at(field + ".pins", p);
-    const std::vector<int>& particles = sheet.pins[p].particles;
-    if (particles.empty())
-      check.problem(pin + ".particles", "is empty; a pin holds 1 particle or more");
-    for (std::size_t k = 0; k < particles.size(); ++k) {
-      const std::string particle = at(pin + ".particles", k);
-      if (check.number(particle, particles[k], 0, sheet.particle_count() - 1, "") &&
-          !pinned.insert(particles[k]).second)
-        check.problem(particle, std::to_string(particles[k]) + " is pinned twice");
-    }
+    check_particles(sheet.pins[p].particles, sheet.particle_count(), pin + ".particles",
+                    "a pin holds 1 particle or more", "pinned", pinned, check);
     check.path(pin + ".path", sheet.pins[p].path);
   }
 }
@@ -268,6 +273,31 @@ void check_reach(const Scene& scene, const Collider& collider, const std::string
                                          text(skin) + " m");
 }
 
+void check_dressing(const Scene& scene, Check& check) {
+  constexpr std::size_t kMostHolds = 64;
+  const Dressing& dressing = *scene.dressing;
+  check.number("dressing.close_s", dressing.close, 0, 60, "s");
+  check.number("dressing.settle_s", dressing.settle, 0, 60, "s");
+  check.number("dressing.drag_per_s", dressing.drag, 0, 1000, "1/s");
+  check.number("dressing.deflate_m", dressing.deflate, 0, 0.1, "m");
+  check.number("dressing.holds", static_cast<double>(dressing.holds.size()), 0, kMostHolds,
+               "elements");
+  for (std::size_t h = 0; h < dressing.holds.size(); ++h) {
+    const Hold& hold = dressing.holds[h];
+    const std::string field = at("dressing.holds", h);
+    check.number(field + ".until_s", hold.until, 0, 1000, "s");
+    const SheetDefinition& sheet = scene.sheets[static_cast<std::size_t>(hold.sheet)];
+    std::set<int> held;
+    check_particles(hold.particles, sheet.particle_count(), field + ".particles",
+                    "a hold has 1 particle or more", "held", held, check);
+  }
+  for (std::size_t s = 0; s < scene.sheets.size(); ++s)
+    if (std::holds_alternative<Triangles>(scene.sheets[s].shape) &&
+        std::holds_alternative<ChoiKo>(scene.sheets[s].bending))
+      check.problem(at("sheets", s) + ".bending",
+                    "is CHOI_KO; sheets of triangles that are dressed need ISOMETRIC");
+}
+
 void check_environment(const Environment& environment, Check& check) {
   check.vector("environment.gravity_m_per_s2", environment.gravity, 1000, "m/s^2");
   if (!environment.wind) return;
@@ -313,6 +343,7 @@ std::vector<Problem> find_problems(const Scene& scene) {
     check.path(field + ".path", collider.path);
     check.speed(field + ".path", collider.path);
   }
+  if (scene.dressing) check_dressing(scene, check);
   check_environment(scene.environment, check);
   check_solver(scene.solver, check);
   return check.take();

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/model/body.h"
+#include "core/model/dressing.h"
 #include "core/model/shape.h"
 #include "core/model/textile.h"
 
@@ -172,6 +173,7 @@ struct Scene {
   std::vector<Collider> colliders;
   Environment environment;
   SolverSettings solver;
+  std::optional<Dressing> dressing;
 };
 
 struct Problem {

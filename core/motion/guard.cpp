@@ -46,6 +46,10 @@ double motion_speed(const Scene& scene, const SheetDefinition& sheet, double beg
       for (const Pin& pin : each.pins) speed = std::max(speed, path_speed(pin.path, begin, end));
   for (const Collider& collider : scene.colliders)
     speed = std::max(speed, path_speed(collider.path, begin, end));
+  // seams pull panels along
+  constexpr double kClosing = 1;  // m/s
+  if (scene.dressing && begin < scene.dressing->close + scene.dressing->settle)
+    speed = std::max(speed, kClosing);
   return speed;
 }
 
@@ -58,42 +62,41 @@ double drive_speed(const Scene& scene, const SheetDefinition& sheet, double begi
   return std::max(motion_speed(scene, sheet, begin, end), wind_speed(scene));
 }
 
-Verdict inspect_finite(const SheetState& after) {
-  Verdict verdict;
-  verdict.finite = within_reach(after.x) && within_reach(after.v);
-  if (!verdict.finite) verdict.reason = "a position or velocity stopped being finite";
-  return verdict;
+Inspection inspect_finite(const SheetState& after) {
+  Inspection found;
+  found.finite = within_reach(after.x) && within_reach(after.v);
+  if (!found.finite) found.reason = "a position or velocity stopped being finite";
+  return found;
 }
 
-Verdict inspect(const Mesh& mesh, const Drive& drive, double most_strain, const SheetState& before,
-                const SheetState& after) {
-  Verdict verdict = inspect_finite(after);
-  if (!verdict.finite) return verdict;
+Inspection inspect(const Mesh& mesh, const Drive& drive, double most_strain,
+                   const SheetState& before, const SheetState& after) {
+  Inspection found = inspect_finite(after);
+  if (!found.finite) return found;
 
-  verdict.strain = largest_strain(mesh, after.x);
-  if (verdict.strain > most_strain)
-    verdict.reason = join("a strain of ", 100 * verdict.strain, " % passed the limit of ",
-                          100 * most_strain, " %");
+  found.strain = largest_strain(mesh, after.x);
+  if (found.strain > most_strain)
+    found.reason = join("a strain of ", 100 * found.strain, " % passed the limit of ",
+                        100 * most_strain, " %");
 
   // energy cannot have grown much unless motion did
   const double mass = mesh.mass.sum();
   const double fall = drive.gravity.norm() * drive.frame_step;
   const double driven = 10 * mass * (drive.speed * drive.speed + fall * fall);  // J
   const double kinetic = after.kinetic_energy, kinetic_before = before.kinetic_energy;
-  if (kinetic <= 2 * kinetic_before + driven && verdict.reason.empty()) return verdict;
+  if (kinetic <= 2 * kinetic_before + driven && found.reason.empty()) return found;
   const double elastic_before = elastic_energy(mesh, before.x);
   const double weight_work = mesh.mass.dot((after.x - before.x).transpose() * drive.gravity);
   const double grown =
       kinetic - kinetic_before + elastic_energy(mesh, after.x) - elastic_before - weight_work;
   const double limit = kinetic_before + elastic_before + driven;
-  verdict.energy = kinetic_before + elastic_before + grown;
-  if (grown > limit && verdict.reason.empty())
-    verdict.reason =
-        join("energy grew by ", grown, " J in a frame, past the limit of ", limit, " J");
-  return verdict;
+  found.energy = kinetic_before + elastic_before + grown;
+  if (grown > limit && found.reason.empty())
+    found.reason = join("energy grew by ", grown, " J in a frame, past the limit of ", limit, " J");
+  return found;
 }
 
-bool confirms(const Verdict& one, const Verdict& other) {
+bool confirms(const Inspection& one, const Inspection& other) {
   return one.finite && other.finite && close(one.strain, other.strain) &&
          close(one.energy, other.energy);
 }

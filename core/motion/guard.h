@@ -34,7 +34,7 @@ double wind_speed(const Scene& scene);
 double drive_speed(const Scene& scene, const SheetDefinition& sheet, double begin, double end);
 
 // What the guard saw of a sheet after a frame.
-struct Verdict {
+struct Inspection {
   std::string reason;  // why the frame is not to be trusted; empty: nothing speaks against it
   bool finite = true;
   double strain = 0;  // largest of the stretch connections
@@ -45,14 +45,14 @@ struct Verdict {
 // `most_strain`; energy (kinetic, elastic and gravity) that grew by more than the sheet had at
 // `before`, as motion and elastic energy, plus 10 M (u^2 + (g T)^2), u the speed of the drive and T
 // the frame step. Energies are added up only where the kinetic one calls for it.
-Verdict inspect(const Mesh& mesh, const Drive& drive, double most_strain, const SheetState& before,
-                const SheetState& after);
+Inspection inspect(const Mesh& mesh, const Drive& drive, double most_strain,
+                   const SheetState& before, const SheetState& after);
 
 // The same, for what is not finite alone.
-Verdict inspect_finite(const SheetState& after);
+Inspection inspect_finite(const SheetState& after);
 
 // Whether two attempts at a frame, one of them at half the step of the other, show a motion of the
 // sheet rather than a divergence: within a quarter of each other.
-bool confirms(const Verdict& one, const Verdict& other);
+bool confirms(const Inspection& one, const Inspection& other);
 
 }  // namespace weft

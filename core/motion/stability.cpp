@@ -365,24 +365,37 @@ Rates largest_rates(const Mesh& mesh, const VectorXd& inverse_mass, double dampi
           damped.cwiseProduct(inverse_mass)};
 }
 
-// Of triangles. The bound is that of the particle that bears least, and holds up to a strain of
-// kBoundStrain, or up to that of the shape; the estimate takes the Jacobian at x.
-StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
-                        double air_rate, const Matrix3Xd& x) {
+// The linear bound of triangles: that of the particle that bears least. It holds up to a strain of
+// kBoundStrain, or up to that of the shape.
+struct SurfaceStep {
+  double bound = kInfinity;  // s
+  double damping = 0;        // of the particle that is damped most, 1/s
+  int limiting_particle = -1;
+};
+SurfaceStep bounded_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
+                         double air_rate, const Matrix3Xd& x) {
   const double strain = std::max(kBoundStrain, largest_strain(mesh, x));
   const Rates rates = largest_rates(mesh, inverse_mass, mesh.damping, strain);
-  StableStep step;
-  step.linear_bound = kInfinity;
-  double gamma = 0;
+  SurfaceStep step;
   for (Eigen::Index i = 0; i < inverse_mass.size(); ++i) {
     if (inverse_mass[i] == 0) continue;
     const double damping = rates.damping[i] + air_rate;
     const double most = limit(integrator, rates.stiffness[i], damping);
-    gamma = std::max(gamma, damping);
-    if (most >= step.linear_bound) continue;
-    step.linear_bound = most;
+    step.damping = std::max(step.damping, damping);
+    if (most >= step.bound) continue;
+    step.bound = most;
     step.limiting_particle = static_cast<int>(i);
   }
+  return step;
+}
+
+// The estimate takes the Jacobian at x.
+StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
+                        double air_rate, const Matrix3Xd& x) {
+  const auto [bound, gamma, limiting] = bounded_step(mesh, inverse_mass, integrator, air_rate, x);
+  StableStep step;
+  step.linear_bound = bound;
+  step.limiting_particle = limiting;
 
   SurfaceOperator jacobian(mesh, inverse_mass, air_rate, x);
   const double stiffness = eigenvalue(jacobian, 1, 0);
@@ -398,6 +411,11 @@ StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrat
 }
 
 }  // namespace
+
+double linear_bound(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
+                    double air_rate, const Matrix3Xd& x) {
+  return bounded_step(mesh, inverse_mass, integrator, air_rate, x).bound;
+}
 
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                        double air_rate, const Matrix3Xd& x) {

@@ -23,6 +23,10 @@ struct StableStep {
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                        double air_rate, const Matrix3Xd& x);
 
+// The linear bound of triangles alone, in a fraction of the time, s.
+double linear_bound(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
+                    double air_rate, const Matrix3Xd& x);
+
 // The k_d with which the stiffest mode of a sheet that nothing holds has a damping ratio, kg/s; 0
 // where nothing is stiff.
 double damping_for(const Mesh& mesh, double ratio);

@@ -56,6 +56,7 @@ v1::Session to_proto(const Session& session, StartValues start_values = StartVal
 // One that another server has, with the scene as it was given: what never changes of it.
 v1::Session to_proto(const SessionIdentity& identity, v1::Scene given);
 v1::Snapshot to_proto(const Session& session, const NamedSnapshot& snapshot);
+v1::Verdict to_proto(const Judgement& judgement, std::int64_t frame);
 v1::Textile to_proto(const Textile& textile);
 
 // As it was given: a clamp that follows from the stretch stays absent.

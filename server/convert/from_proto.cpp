@@ -100,6 +100,7 @@ class Reader {
   BendingLaw bending(const v1::BendingLaw& from, const std::string& field);
   MeasuredTextile preset(const std::string& name, const std::string& field);
   Collider collider(const v1::Collider& from, const std::string& field);
+  Dressing dressing(const v1::Dressing& from, const std::vector<SheetDefinition>& sheets);
   Environment environment(const v1::Environment& from);
   SolverSettings solver(const v1::SolverSettings& from);
 
@@ -131,6 +132,7 @@ Scene Reader::scene(const v1::Scene& from) {
     scene.colliders.back().name = collider_names[static_cast<std::size_t>(i)];
   }
   scene.cloth_contact = from.cloth_contact();
+  if (from.has_dressing()) scene.dressing = dressing(from.dressing(), scene.sheets);
   scene.environment = environment(from.environment());
   scene.solver = solver(from.solver());
   return scene;
@@ -339,6 +341,31 @@ void Reader::set_body(const v1::BodyMesh& from, const std::string& field, Collid
   else
     collider.shape = std::get<SharedBody>(std::move(made));
   if (from.has_asset()) collider.asset = from.asset();
+}
+
+Dressing Reader::dressing(const v1::Dressing& from, const std::vector<SheetDefinition>& sheets) {
+  Dressing dressing;
+  if (from.has_close_s()) dressing.close = from.close_s();
+  if (from.has_settle_s()) dressing.settle = from.settle_s();
+  if (from.has_drag_per_s()) dressing.drag = from.drag_per_s();
+  dressing.deflate = from.deflate_m();
+  for (int h = 0; h < from.holds_size(); ++h) {
+    const v1::Hold& given = from.holds(h);
+    const std::string field = at("dressing.holds", h) + ".sheet";
+    Hold& hold = dressing.holds.emplace_back();
+    hold.particles.assign(given.particles().begin(), given.particles().end());
+    if (given.has_until_s()) hold.until = given.until_s();
+    const auto named = std::find_if(sheets.begin(), sheets.end(), [&](const SheetDefinition& each) {
+      return each.name == given.sheet();
+    });
+    if (named != sheets.end())
+      hold.sheet = static_cast<int>(named - sheets.begin());
+    else if (!given.sheet().empty())
+      problem(field, "the scene has no sheet \"" + given.sheet() + "\"");
+    else if (sheets.size() != 1)
+      problem(field, "is absent, and the scene has " + std::to_string(sheets.size()) + " sheets");
+  }
+  return dressing;
 }
 
 Environment Reader::environment(const v1::Environment& from) {

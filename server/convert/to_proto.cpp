@@ -137,6 +137,19 @@ void set(v1::Collider* to, const Capsule& capsule) {
 // The rest is the collider's.
 void set(v1::Collider* to, const SharedBody& /*body*/) { to->mutable_mesh(); }
 
+void set(v1::Dressing* to, const Dressing& from, const std::vector<SheetDefinition>& sheets) {
+  to->set_close_s(from.close);
+  to->set_settle_s(from.settle);
+  to->set_drag_per_s(from.drag);
+  to->set_deflate_m(from.deflate);
+  for (const Hold& hold : from.holds) {
+    v1::Hold* added = to->add_holds();
+    added->set_sheet(sheets[static_cast<std::size_t>(hold.sheet)].name);
+    added->mutable_particles()->Add(hold.particles.begin(), hold.particles.end());
+    added->set_until_s(hold.until);
+  }
+}
+
 void set(v1::Environment* to, const Environment& from) {
   set(to->mutable_gravity_m_per_s2(), from.gravity);
   if (!from.wind) return;
@@ -175,6 +188,7 @@ void set(v1::Scene* to, const Scene& from, const std::vector<Textile>& textiles,
     *added->mutable_path() = to_proto(collider.path);
   }
   to->set_cloth_contact(from.cloth_contact);
+  if (from.dressing) set(to->mutable_dressing(), *from.dressing, from.sheets);
   set(to->mutable_environment(), from.environment);
   set(to->mutable_solver(), from.solver);
 }
@@ -235,6 +249,30 @@ v1::Session to_proto(const Session& session, StartValues start_values) {
   result.set_lateness_s(status.lateness.count());
   for (const auto& repair : status.repairs) *result.add_repairs() = to_proto(repair);
   return result;
+}
+
+v1::Verdict to_proto(const Judgement& judgement, std::int64_t frame) {
+  const Verdict& from = judgement.verdict;
+  v1::Verdict to;
+  to.set_frame(frame);
+  to.set_good(from.faults.empty());
+  for (const Fault& fault : from.faults) {
+    v1::Fault* added = to.add_faults();
+    added->set_code(fault.code);
+    added->set_message(fault.message);
+  }
+  to.set_dressed(from.dressed);
+  to.set_at_rest(from.at_rest);
+  to.set_cloth_cut_count(from.cloth_cuts);
+  to.set_particles_inside(from.particles_inside);
+  to.set_deepest_m(from.deepest);
+  to.set_strain_warp(from.strain_warp);
+  to.set_strain_weft(from.strain_weft);
+  to.set_largest_pressure_pa(from.largest_pressure);
+  to.set_slid_m(from.slid);
+  to.set_substep_count(judgement.substeps);
+  to.set_computing_s(judgement.seconds);
+  return to;
 }
 
 v1::Snapshot to_proto(const Session& session, const NamedSnapshot& snapshot) {

@@ -425,6 +425,22 @@ grpc::ServerUnaryReactor* SessionService::PauseSession(grpc::CallbackServerConte
   return on_session(backend_, context, request->name(), pause);
 }
 
+grpc::ServerUnaryReactor* SessionService::GetVerdict(grpc::CallbackServerContext* context,
+                                                     const v1::GetVerdictRequest* request,
+                                                     v1::Verdict* response) {
+  const auto judge = [response](const Asked& asked, UnaryCall& call) {
+    const auto finish = [&call, response, session = asked.session](const Outcome& outcome) {
+      if (const auto* refusal = std::get_if<Refusal>(&outcome))
+        return call.Finish(to_status(*refusal, *session));
+      const auto& seen = std::get<Applied>(outcome);
+      *response = to_proto(*seen.judgement, seen.newest);
+      call.Finish(grpc::Status::OK);
+    };
+    asked.session->submit(Judge{{}, finish});
+  };
+  return on_session(backend_, context, request->name(), judge);
+}
+
 grpc::ServerUnaryReactor* SessionService::CreateSnapshot(grpc::CallbackServerContext* context,
                                                          const v1::CreateSnapshotRequest* request,
                                                          v1::Snapshot* response) {

@@ -28,8 +28,11 @@ using SessionMethods = v1::SessionService::WithCallbackMethod_CreateSession<
                                     v1::SessionService::WithCallbackMethod_CreateSnapshot<
                                         v1::SessionService::WithCallbackMethod_ListSnapshots<
                                             v1::SessionService::WithCallbackMethod_RestoreSession<
-                                                v1::SessionService::WithRawCallbackMethod_Interact<
-                                                    v1::SessionService::Service>>>>>>>>>>>>>;
+                                                v1::SessionService::WithCallbackMethod_GetVerdict<
+                                                    v1::SessionService::
+                                                        WithRawCallbackMethod_Interact<
+                                                            v1::SessionService::
+                                                                Service>>>>>>>>>>>>>>;
 
 // Why a session did not carry a command out.
 grpc::Status to_status(const Refusal& refusal, const Session& session);
@@ -68,6 +71,10 @@ class SessionService final : public SessionMethods {
                                          v1::ApplyActionsResponse* response) override;
   grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* Interact(
       grpc::CallbackServerContext* context) override;
+
+  grpc::ServerUnaryReactor* GetVerdict(grpc::CallbackServerContext* context,
+                                       const v1::GetVerdictRequest* request,
+                                       v1::Verdict* response) override;
 
   grpc::ServerUnaryReactor* CreateSnapshot(grpc::CallbackServerContext* context,
                                            const v1::CreateSnapshotRequest* request,

@@ -42,6 +42,14 @@ struct Refusal {
   std::string text;
 };
 
+// How the sheets sit in the newest frame, and what it took to come there since this process has the
+// session.
+struct Judgement {
+  Verdict verdict;
+  std::int64_t substeps = 0;
+  double seconds = 0;  // of computing
+};
+
 // How a session stood when a command had been carried out.
 struct Applied {
   std::int64_t frame = 0;   // first frame in which it shows
@@ -50,6 +58,7 @@ struct Applied {
   bool at_rest = false;     // the newest
   Textile textile;          // of SetTextile
   std::shared_ptr<const Plan> plan;
+  std::shared_ptr<const Judgement> judgement = {};  // of Judge
 };
 
 using Outcome = std::variant<Applied, Refusal>;
@@ -109,6 +118,13 @@ struct KeepSnapshot {
   Done done;
 };
 
-using Command = std::variant<StepCommand, RunCommand, PauseCommand, SetTextile, Act, KeepSnapshot>;
+// Judges how the sheets sit, see Simulation::verdict().
+struct Judge {
+  Request request;
+  Done done;
+};
+
+using Command =
+    std::variant<StepCommand, RunCommand, PauseCommand, SetTextile, Act, KeepSnapshot, Judge>;
 
 }  // namespace weft

@@ -187,6 +187,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   void execute(SetTextile command);
   void execute(Act command);
   void execute(KeepSnapshot command);
+  void execute(Judge command);
   std::optional<Refusal> refusal_of(const KeepSnapshot& command) const;
   void enter(const KeepSnapshot& command, const NamedSnapshot& made, const std::string& error);
   void begin_step();

@@ -142,6 +142,12 @@ void Session::execute(PauseCommand command) {
   carry_out(command.request, command.done, Paused{});
 }
 
+void Session::execute(Judge command) {
+  Applied seen = applied(latest());
+  seen.judgement = std::make_shared<const Judgement>(timeline_.judge());
+  command.done(seen);
+}
+
 void Session::execute(SetTextile command) {
   std::optional<Refusal> refusal;
   {
@@ -379,7 +385,7 @@ std::optional<Refusal> Session::refusal_of_change() const {
 
 Applied Session::applied(std::int64_t frame) const {
   const Frame& newest = *audience_.newest();
-  return {frame, newest.number, newest.time, newest.at_rest, {}, plan_};
+  return {frame, newest.number, newest.time, newest.at_rest, {}, plan_, {}};
 }
 
 }  // namespace weft

@@ -47,6 +47,8 @@ void Timeline::count_frame(Stats& stats) {
     ++stats.sleeping_frames;
     return;
   }
+  computing_ += time;
+  substeps_ += simulation.substeps();
   stats.substeps += simulation.substeps();
   stats.particle_substeps += simulation.substeps() * simulation.particle_count();
   stats.frame_time.add(time);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/simulation.h"
+#include "server/session/command.h"
 #include "server/session/frame.h"
 #include "server/session/scheduler.h"
 #include "server/session/snapshot.h"
@@ -27,6 +28,7 @@ class Timeline {
   FramePart advance(Scheduler& scheduler);
   // Counts the frame that is done.
   void count_frame(Stats& stats);
+  Judgement judge() const { return {simulation.verdict(), substeps_, computing_.count()}; }
   // Takes back the frame under way; false where it cannot be.
   [[nodiscard]] bool drop_frame();
   std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs) const;
@@ -46,6 +48,8 @@ class Timeline {
   Duration work_{};                       // since the last snapshot
   Duration frame_work_{};                 // of the frame under way
   std::int64_t entries_in_snapshot_ = 0;  // the last one
+  Duration computing_{};                  // of all frames
+  std::int64_t substeps_ = 0;             // of all frames
 };
 
 }  // namespace weft

@@ -173,6 +173,7 @@ std::vector<std::string> known_requests(const std::string& type) {
       {"StepSessionRequest", "name: 'sessions/it' frames: 2 expected_frame: 0"},
       {"RunSessionRequest", "name: 'sessions/it' time_scale: 2 until_frame: 3 until_rest: true"},
       {"PauseSessionRequest", "name: 'sessions/it'"},
+      {"GetVerdictRequest", "name: 'sessions/it'"},
       {"CreateSnapshotRequest", "parent: 'sessions/it' snapshot_id: 'another'"},
       {"ListSnapshotsRequest", "parent: 'sessions/it'"},
       {"RestoreSessionRequest", "name: 'sessions/it/snapshots/it' session_id: 'new'"},

@@ -17,9 +17,11 @@ from .scene import (
     ChoiKo,
     Collider,
     Drag,
+    Dressing,
     Environment,
     Grab,
     Grid,
+    Hold,
     Isometric,
     Keyframe,
     MeasuredTextile,
@@ -44,9 +46,10 @@ from .scene import (
 
 __all__ = [
     "BendingLaw", "BodyMesh", "Box", "Capsule", "ChoiKo", "Collider", "Damaged", "Drag",
-    "Environment", "Error", "Frame", "Grab", "Grid", "Hand", "InvalidArgument", "Isometric",
-    "Keyframe", "MeasuredTextile", "MeshData", "MoveCollider", "NoConnection", "NotFound", "Panel",
-    "Pin", "PinParticle", "Placement", "Plane", "RawTextile", "Recording", "Release", "Scene",
-    "Server", "Session", "Sheet", "SolverSettings", "Sphere", "Textile", "TriangleSheet",
-    "UnpinParticle", "Violation", "Wind", "aio", "connect", "errors", "open", "serve", "v1",
+    "Dressing", "Environment", "Error", "Frame", "Grab", "Grid", "Hand", "Hold",
+    "InvalidArgument", "Isometric", "Keyframe", "MeasuredTextile", "MeshData", "MoveCollider",
+    "NoConnection", "NotFound", "Panel", "Pin", "PinParticle", "Placement", "Plane", "RawTextile",
+    "Recording", "Release", "Scene", "Server", "Session", "Sheet", "SolverSettings", "Sphere",
+    "Textile", "TriangleSheet", "UnpinParticle", "Violation", "Wind", "aio", "connect", "errors",
+    "open", "serve", "v1",
 ]

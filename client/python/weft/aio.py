@@ -284,6 +284,12 @@ class Session:
         frame: int = answer.applied_frame
         return frame
 
+    async def verdict(self) -> session_pb2.Verdict:
+        verdict: session_pb2.Verdict = await self.server.call(
+            session_pb2.GetVerdictRequest(name=self.name)
+        )
+        return verdict
+
     async def wait(self) -> session_pb2.Session:
         start = (await self.get()).frame
         request = calls.stream_request(self.name, start, None, True, format_of(particles=range(1)))

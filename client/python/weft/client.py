@@ -344,6 +344,13 @@ class Session:
         frame: int = self.server.call(session_pb2.PauseSessionRequest(name=self.name)).applied_frame
         return frame
 
+    def verdict(self) -> session_pb2.Verdict:
+        """How its cloth sits now: whether a dressed garment is good, and what keeps it from that."""
+        verdict: session_pb2.Verdict = self.server.call(
+            session_pb2.GetVerdictRequest(name=self.name)
+        )
+        return verdict
+
     def wait(self) -> session_pb2.Session:
         """Waits until it stands still: at rest, at its last frame, or paused."""
         start = self.get().frame

@@ -366,6 +366,28 @@ class Environment(Value):
 
 
 @dataclass(eq=False)
+class Hold(Value):
+    """Particles that keep their height until a garment hangs."""
+
+    message = scene_pb2.Hold
+    sheet: str = ""
+    particles: Sequence[int] = ()
+    until_s: float | None = None
+
+
+@dataclass(eq=False)
+class Dressing(Value):
+    """How garments are put on before they hang by themselves."""
+
+    message = scene_pb2.Dressing
+    close_s: float | None = None
+    settle_s: float | None = None
+    drag_per_s: float | None = None
+    deflate_m: float | None = None
+    holds: Sequence[Hold] = ()
+
+
+@dataclass(eq=False)
 class SolverSettings(Value):
     """How time is stepped."""
 
@@ -397,6 +419,7 @@ class Scene(Value):
     environment: Environment | None = None
     solver: SolverSettings | None = None
     cloth_contact: bool = False
+    dressing: Dressing | None = None
 
     def to_json(self) -> str:
         """What stands in a scene file."""

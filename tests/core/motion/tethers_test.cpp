@@ -131,9 +131,9 @@ TEST(Tethers, OfTrianglesReachAsFarAsTheClothDoes) {
 double pendulum(double length, double seconds) {
   const auto acceleration = [&](double phi) { return -9.8 / length * std::sin(phi); };
   double phi = std::numbers::pi / 2, omega = 0;
-  constexpr int kSteps = 10'000;
-  const double dt = seconds / kSteps;
-  for (int step = 0; step < kSteps; ++step) {
+  constexpr int kParts = 10'000;
+  const double dt = seconds / kParts;
+  for (int step = 0; step < kParts; ++step) {
     const double v1 = omega, a1 = acceleration(phi);
     const double v2 = omega + dt / 2 * a1, a2 = acceleration(phi + dt / 2 * v1);
     const double v3 = omega + dt / 2 * a2, a3 = acceleration(phi + dt / 2 * v2);

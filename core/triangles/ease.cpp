@@ -1,0 +1,55 @@
+#include "core/triangles/ease.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace weft {
+namespace {
+
+using Eigen::Matrix2d;
+constexpr double kShortest = 0.7;  // of a thread's length
+
+// The symmetric factor of the deformation of a triangle along warp and weft.
+Eigen::SelfAdjointEigenSolver<Matrix2d> squared_stretch(const MembraneElement& element,
+                                                        const Matrix3Xd& x) {
+  Vector3d along_warp = Vector3d::Zero(), along_weft = Vector3d::Zero();
+  for (std::size_t k = 0; k < 3; ++k) {
+    along_warp += element.du[k] * x.col(element.particle[k]);
+    along_weft += element.dv[k] * x.col(element.particle[k]);
+  }
+  Matrix2d squared;
+  squared << along_warp.squaredNorm(), along_warp.dot(along_weft), along_warp.dot(along_weft),
+      along_weft.squaredNorm();
+  return Eigen::SelfAdjointEigenSolver<Matrix2d>(squared);
+}
+
+}  // namespace
+
+void ease(const SheetDefinition& sheet, double share, Mesh& mesh) {
+  const Matrix3Xd x = start_positions(sheet);
+  VectorXd longest = VectorXd::Ones(x.cols());  // stretch around each particle
+  for (MembraneElement& element : mesh.surface.membrane) {
+    const auto start = squared_stretch(element, x);
+    const Eigen::Vector2d stretch =
+        start.eigenvalues().cwiseMax(kShortest * kShortest).array().pow((1 - share) / 2);
+    const Matrix2d inverse = start.eigenvectors() * stretch.cwiseInverse().asDiagonal() *
+                             start.eigenvectors().transpose();
+    const double longest_thread = std::max(1.0, stretch.maxCoeff());
+    element.area /= longest_thread * longest_thread;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector2d gradient = inverse * Eigen::Vector2d(element.du[k], element.dv[k]);
+      element.du[k] = gradient.x();
+      element.dv[k] = gradient.y();
+      double& most = longest[element.particle[k]];
+      most = std::max(most, longest_thread);
+    }
+  }
+  for (CurvatureFit& fit : mesh.surface.fits) {
+    double most = 1;
+    for (const int i : fit.particle) most = std::max(most, longest[i]);
+    fit.area *= std::pow(most, -4);
+  }
+}
+
+}  // namespace weft

@@ -1,0 +1,175 @@
+#include "core/verdict.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "core/cloth_contact/cuts.h"
+#include "core/contact/contact.h"
+#include "core/contact/triangle_tree.h"
+#include "core/forces/elastic.h"
+#include "core/model/strain.h"
+#include "core/model/text.h"
+#include "core/moving_sheet.h"
+
+namespace weft {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+constexpr double kMostStrain99 = 0.1;  // of cloth that fits
+constexpr double kMostSlid = 0.03;     // m
+constexpr double kMostDepth = 1e-4;    // of a particle in a collider, m
+
+// The nearest collider.
+struct Nearest {
+  Distance distance{kInfinite, Vector3d::UnitY()};
+  const Collider* collider = nullptr;
+};
+Nearest nearest_collider(const Scene& scene, const Vector3d& x, double time) {
+  Nearest nearest;
+  for (const Collider& collider : scene.colliders)
+    if (const Distance found = distance(collider, x, time); found.value < nearest.distance.value)
+      nearest = {found, &collider};
+  return nearest;
+}
+
+// Of each particle, m^2.
+VectorXd areas_of(const SheetShape& shape, const Matrix3Xd& x) {
+  VectorXd areas = VectorXd::Zero(x.cols());
+  for (const auto& [a, b, c] : triangles_of(shape)) {
+    const Vector3d ab = x.col(b) - x.col(a), ac = x.col(c) - x.col(a);
+    const double third = ab.cross(ac).norm() / 6;
+    for (const int i : {a, b, c}) areas[i] += third;
+  }
+  return areas;
+}
+
+double percentile_99(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) * 99 / 100);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+void find_strains(const Scene& scene, const std::vector<Matrix3Xd>& x, Verdict& verdict) {
+  std::vector<double> warp, weft;
+  for (std::size_t s = 0; s < x.size(); ++s) {
+    const Eigen::MatrixX3d planes = x[s].transpose();
+    const std::vector<double> all =
+        strains_of({planes.data(), planes.data() + planes.size()}, {scene.sheets[s].shape});
+    const auto third = static_cast<std::ptrdiff_t>(all.size() / 3);
+    warp.insert(warp.end(), all.begin(), all.begin() + third);
+    weft.insert(weft.end(), all.begin() + third, all.begin() + 2 * third);
+  }
+  verdict.strain_warp = percentile_99(std::move(warp));
+  verdict.strain_weft = percentile_99(std::move(weft));
+}
+
+void find_inside(const Scene& scene, const std::vector<Matrix3Xd>& x, double time,
+                 Verdict& verdict) {
+  for (const Matrix3Xd& sheet : x)
+    for (const auto& position : sheet.colwise()) {
+      const double depth = -nearest_collider(scene, position, time).distance.value;
+      if (depth <= kMostDepth) continue;
+      ++verdict.particles_inside;
+      verdict.deepest = std::max(verdict.deepest, depth);
+    }
+}
+
+void find_slid(const Scene& scene, const std::vector<MovingSheet>& sheets,
+               const std::vector<Matrix3Xd>& x, Verdict& verdict) {
+  const Vector3d& gravity = scene.environment.gravity;
+  if (!scene.dressing || gravity.isZero()) return;
+  const Vector3d down = gravity.normalized();
+  for (const Hold& hold : scene.dressing->holds) {
+    const auto s = static_cast<std::size_t>(hold.sheet);
+    double sum = 0;
+    for (const int i : hold.particles) sum += (x[s].col(i) - sheets[s].start(i)).dot(down);
+    verdict.slid = std::max(verdict.slid, sum / static_cast<double>(hold.particles.size()));
+  }
+}
+
+void find_faults(const Scene& scene, Verdict& verdict) {
+  const auto fault = [&](const char* code, const std::string& message) {
+    verdict.faults.push_back({code, message});
+  };
+  if (!verdict.dressed)
+    fault("NOT_DRESSED",
+          join("seams close, weight comes in and holds end by ", scene.dressing->end(), " s"));
+  if (!verdict.at_rest) fault("NOT_AT_REST", "the cloth still moves");
+  if (verdict.cloth_cuts > 0)
+    fault("CLOTH_CUTS", join(verdict.cloth_cuts, " edges pass through cloth"));
+  if (verdict.particles_inside > 0)
+    fault("INSIDE_BODY", join(verdict.particles_inside, " particles are inside a collider, up to ",
+                              1000 * verdict.deepest, " mm deep"));
+  if (verdict.slid > kMostSlid)
+    fault("SLID_DOWN",
+          join("what was held has come down by ", 1000 * verdict.slid, " mm, more than ",
+               1000 * kMostSlid, " mm: it is too wide there, or too smooth"));
+  if (const double strain = std::max(verdict.strain_warp, verdict.strain_weft);
+      strain > kMostStrain99)
+    fault("TOO_TIGHT", join("1 % of the triangles are strained by ", 100 * strain, " %, more than ",
+                            100 * kMostStrain99, " %"));
+}
+
+}  // namespace
+
+VectorXd clearances(const Scene& scene, const Matrix3Xd& x, double time) {
+  VectorXd least = VectorXd::Constant(x.cols(), kInfinite);
+  for (const Collider& collider : scene.colliders) {
+    const auto* body = std::get_if<SharedBody>(&collider.shape);
+    std::optional<TriangleTree> tree;  // the grid is exact but near the surface
+    if (body != nullptr) tree.emplace((*body)->mesh);
+    const Vector3d offset = offset_at(collider.path, time);
+    int guess = 0;
+    for (Eigen::Index i = 0; i < x.cols(); ++i) {
+      double value = distance(collider, x.col(i), time).value;
+      if (tree) {
+        const TriangleTree::Nearest nearest = tree->nearest(x.col(i) - offset, guess);
+        guess = nearest.triangle;
+        value = std::copysign(std::sqrt(nearest.squared), value);
+      }
+      least[i] = std::min(least[i], value);
+    }
+  }
+  return least;
+}
+
+VectorXd pressures(const Scene& scene, const SheetDefinition& sheet, const MovingSheet& moving,
+                   const Matrix3Xd& x, double time) {
+  constexpr double kTouching = 0.1;  // of the skin
+  const VectorXd areas = areas_of(sheet.shape, x);
+  Matrix3Xd force = moving.dynamics.gravity * moving.mesh.mass.transpose();
+  add_elastic_forces(moving.mesh, x, Matrix3Xd::Zero(3, x.cols()), force);
+  VectorXd pressure = VectorXd::Zero(x.cols());
+  for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    if (moving.dynamics.inverse_mass[i] == 0 || areas[i] == 0) continue;
+    const auto [value, normal] = nearest_collider(scene, x.col(i), time).distance;
+    if (value < (1 + kTouching) * moving.skin)
+      pressure[i] = std::max(0.0, -force.col(i).dot(normal)) / areas[i];
+  }
+  return pressure;
+}
+
+Verdict judge(const Scene& scene, const std::vector<MovingSheet>& sheets, double time,
+              bool at_rest) {
+  Verdict verdict;
+  verdict.dressed = !scene.dressing || time >= scene.dressing->end();
+  verdict.at_rest = at_rest;
+  std::vector<Matrix3Xd> x;
+  for (const MovingSheet& sheet : sheets) x.push_back(sheet.good().x);
+  verdict.cloth_cuts = count_cuts(scene.sheets, x, 0).count;
+  find_strains(scene, x, verdict);
+  find_inside(scene, x, time, verdict);
+  find_slid(scene, sheets, x, verdict);
+  for (std::size_t s = 0; s < sheets.size(); ++s)
+    if (!scene.colliders.empty() && x[s].cols() > 0)
+      verdict.largest_pressure =
+          std::max(verdict.largest_pressure,
+                   pressures(scene, scene.sheets[s], sheets[s], x[s], time).maxCoeff());
+  find_faults(scene, verdict);
+  return verdict;
+}
+
+}  // namespace weft

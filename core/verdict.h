@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/model/mesh.h"
+
+namespace weft {
+
+struct MovingSheet;
+
+// Something that keeps a drape from being good.
+struct Fault {
+  std::string code;
+  std::string message;  // with the value and its bound
+};
+
+// How cloth sits, judged from one frame.
+struct Verdict {
+  bool dressed = true;  // seams are closed, weight is in, nothing is held
+  bool at_rest = false;
+  std::int64_t cloth_cuts = 0;        // edges through triangles of cloth, exactly
+  std::int64_t particles_inside = 0;  // of colliders
+  double deepest = 0;                 // of them, m
+  double strain_warp = 0;             // 99th percentile of triangles, l / L - 1
+  double strain_weft = 0;
+  double largest_pressure = 0;  // of colliders on cloth, Pa
+  double slid = 0;              // of what was held: farthest down from its start, its mean, m
+  std::vector<Fault> faults;    // none: it is good
+};
+
+// Distances of particles from the nearest collider at a time, m, negative inside; infinity where a
+// scene has none. x: (3 x particles) m.
+VectorXd clearances(const Scene& scene, const Matrix3Xd& x, double time);
+
+// What colliders press each particle with, Pa: all that forces and weight push it towards one that
+// it touches, over a third of the area of its triangles. So it is for cloth at rest. x: (3 x
+// particles) m, of a sheet in that scene.
+VectorXd pressures(const Scene& scene, const SheetDefinition& sheet, const MovingSheet& moving,
+                   const Matrix3Xd& x, double time);
+
+// The sheets as they are at the end of a frame at `time`, in the order of the scene.
+Verdict judge(const Scene& scene, const std::vector<MovingSheet>& sheets, double time,
+              bool at_rest);
+
+}  // namespace weft

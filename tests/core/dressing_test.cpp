@@ -1,0 +1,291 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/forces/elastic.h"
+#include "core/simulation.h"
+#include "core/triangles/ease.h"
+#include "core/triangles/triangles.h"
+#include "core/verdict.h"
+#include "tests/support/core/scenes.h"
+
+namespace weft::testing {
+namespace {
+
+constexpr int kTubeColumns = 20, kTubeRows = 10;
+constexpr double kPanelWidth = 0.2, kPanelHeight = 0.1;  // of a panel, m
+constexpr double kPanelsApart = 0.08;                    // of a panel from the middle, m
+
+// Two rectangles on both sides of x = y = 0, sewn along their sides to a tube about y. Particles on
+// the seams lie between the panels.
+TriangleMesh sewn_tube() {
+  TriangleMesh mesh;
+  const auto particle = [](int side, int row, int column) {
+    if (column == 0 || column == kTubeColumns) side = 0;
+    const int inner = (kTubeRows + 1) * (kTubeColumns + 1);
+    return side == 0 ? row * (kTubeColumns + 1) + column
+                     : inner + row * (kTubeColumns - 1) + column - 1;
+  };
+  mesh.start.resize(static_cast<std::size_t>((kTubeRows + 1) * 2 * kTubeColumns));
+  for (int side = 0; side < 2; ++side) {
+    const int first = static_cast<int>(mesh.flat.size());
+    for (int row = 0; row <= kTubeRows; ++row)
+      for (int column = 0; column <= kTubeColumns; ++column) {
+        const double u = kPanelWidth * column / kTubeColumns, v = kPanelHeight * row / kTubeRows;
+        const bool sewn = column == 0 || column == kTubeColumns;
+        mesh.start[static_cast<std::size_t>(particle(side, row, column))] =
+            Vector3d(u - kPanelWidth / 2, v,
+                     sewn        ? 0
+                     : side == 0 ? kPanelsApart
+                                 : -kPanelsApart);
+        mesh.flat.emplace_back(side == 0 ? u : 1 - u, v);
+      }
+    for (int row = 0; row < kTubeRows; ++row)
+      for (int column = 0; column < kTubeColumns; ++column)
+        for (const bool upper : {false, true}) {
+          const auto corner = [&](int r, int c) { return std::pair(row + r, column + c); };
+          std::array corners = upper ? std::array{corner(0, 0), corner(1, 1), corner(1, 0)}
+                                     : std::array{corner(0, 0), corner(0, 1), corner(1, 1)};
+          if (side == 1) std::swap(corners[1], corners[2]);
+          auto& triangle = mesh.triangles.emplace_back();
+          auto& flat = mesh.flat_triangles.emplace_back();
+          for (std::size_t k = 0; k < 3; ++k) {
+            triangle[k] = particle(side, corners[k].first, corners[k].second);
+            flat[k] = first + corners[k].first * (kTubeColumns + 1) + corners[k].second;
+          }
+        }
+    mesh.panels.push_back({side == 0 ? "front" : "back", 2 * kTubeRows * kTubeColumns, 0});
+  }
+  return mesh;
+}
+
+// The tube, to be put around a pole.
+Scene around_pole(double radius) {
+  SheetDefinition sheet;
+  sheet.name = "tube";
+  sheet.shape = complete(sewn_tube());
+  sheet.textile.model = MeasuredTextile{.areal_density = 0.15,
+                                        .tensile_warp = 200,
+                                        .tensile_weft = 200,
+                                        .shear = 20,
+                                        .bend_rigidity_warp = 1e-5,
+                                        .bend_rigidity_weft = 1e-5};
+  sheet.textile.friction = 0;
+  sheet.bending = Isometric{};
+  sheet.skin = 0.001;
+  Scene scene;
+  scene.sheets = {sheet};
+  scene.colliders = {{"pole", Capsule{Vector3d(0, -1, 0), Vector3d(0, 1, 0), radius}, 0, {}}};
+  scene.dressing.emplace();
+  return scene;
+}
+
+void dress(Simulation& simulation, int frames) {
+  for (int i = 0; i < frames; ++i) ASSERT_TRUE(simulation.advance_frame()) << simulation.failure();
+}
+
+double mean_height(const Simulation& simulation) { return positions(simulation).row(1).mean(); }
+
+// Around the tube at a row, m.
+double girth(const Simulation& simulation, int row) {
+  const Matrix3Xd x = positions(simulation);
+  const int inner = (kTubeRows + 1) * (kTubeColumns + 1);
+  std::vector<int> ring;
+  for (int c = 0; c <= kTubeColumns; ++c) ring.push_back(row * (kTubeColumns + 1) + c);
+  for (int c = kTubeColumns - 1; c > 0; --c)
+    ring.push_back(inner + row * (kTubeColumns - 1) + c - 1);
+  double sum = 0;
+  for (std::size_t k = 0; k < ring.size(); ++k)
+    sum += (x.col(ring[k]) - x.col(ring[(k + 1) % ring.size()])).norm();
+  return sum;
+}
+
+TEST(Dressing, StartsWithoutStrainAndEndsWithTheFlatShape) {
+  const SheetDefinition sheet = around_pole(0.05).sheets[0];
+  const Mesh flat = make_triangles(sheet);
+  Mesh at_start = flat, at_end = flat;
+  ease(sheet, 0, at_start);
+  ease(sheet, 1, at_end);
+  const Matrix3Xd x = start_positions(sheet);
+  EXPECT_GT(largest_strain(flat, x), 5);
+  EXPECT_LT(largest_strain(at_start, x), 1e-9);
+  for (std::size_t t = 0; t < flat.surface.membrane.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(at_end.surface.membrane[t].du[k], flat.surface.membrane[t].du[k], 1e-9);
+      EXPECT_NEAR(at_end.surface.membrane[t].dv[k], flat.surface.membrane[t].dv[k], 1e-9);
+    }
+}
+
+TEST(Dressing, ForcesOfAnEasedMeshAreTheGradientOfItsEnergy) {
+  const SheetDefinition sheet = around_pole(0.05).sheets[0];
+  Mesh mesh = make_triangles(sheet);
+  ease(sheet, 0.4, mesh);
+  Matrix3Xd x = start_positions(sheet), force = Matrix3Xd::Zero(3, x.cols());
+  add_elastic_forces(mesh, x, Matrix3Xd::Zero(3, x.cols()), force);
+  constexpr double kStep = 1e-6;
+  for (const int i : {0, 1, 5, kTubeColumns, 3 * kTubeColumns})
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = x(axis, i);
+      x(axis, i) = at + kStep;
+      const double more = elastic_energy(mesh, x);
+      x(axis, i) = at - kStep;
+      const double less = elastic_energy(mesh, x);
+      x(axis, i) = at;
+      EXPECT_NEAR(force(axis, i), (less - more) / (2 * kStep), 1e-5);
+    }
+}
+
+TEST(Dressing, PanelsCloseAroundABodyAndKeepTheirSize) {
+  Simulation simulation(around_pole(0.05));
+  dress(simulation, 90);
+  for (const int row : {2, 5, 8})
+    EXPECT_NEAR(girth(simulation, row), 2 * kPanelWidth, 0.01 * kPanelWidth);
+  const Matrix3Xd x = positions(simulation);
+  EXPECT_GT(std::sqrt((x.row(0).array().square() + x.row(2).array().square()).minCoeff()), 0.05);
+  EXPECT_TRUE(simulation.repairs().empty());
+}
+
+TEST(Dressing, AGarmentThatIsTooTightIsStretchedByWhatTheBodyIsLarger) {
+  constexpr double kRadius = 0.068;  // with the skin 8 % more girth than the tube has
+  Scene scene = around_pole(kRadius);
+  scene.environment.gravity = Vector3d::Zero();
+  Simulation simulation(scene);
+  dress(simulation, 120);
+  // a polygon on the skin, whose threads are shortened along the pole by nothing
+  const double turn = std::numbers::pi / (2 * kTubeColumns);
+  const double wanted = 4 * kTubeColumns * (kRadius + 0.001) * std::sin(turn);
+  EXPECT_GT(wanted, 1.08 * 2 * kPanelWidth);
+  for (const int row : {2, 5, 8}) EXPECT_NEAR(girth(simulation, row), wanted, 0.003 * wanted);
+}
+
+// Of a ring under tension: p = T / r.
+TEST(Dressing, ATightGarmentPressesAsItsTensionOverTheRadius) {
+  constexpr double kPole = 0.068;
+  Scene scene = around_pole(kPole);
+  scene.environment.gravity = Vector3d::Zero();
+  Simulation simulation(scene);
+  dress(simulation, 120);
+  const double stretch = girth(simulation, 5) / (2 * kPanelWidth);
+  const double tension = 200 * (stretch * stretch - 1) / 2 * stretch;
+  const Verdict verdict = simulation.verdict();
+  EXPECT_NEAR(verdict.largest_pressure, tension / kPole, 0.05 * tension / kPole);
+  EXPECT_NEAR(verdict.strain_weft, stretch - 1, 0.02 * (stretch - 1));
+  EXPECT_EQ(verdict.particles_inside, 0);
+}
+
+TEST(Dressing, IsJudgedByWhatIsWrongWithIt) {
+  const auto codes = [](const Simulation& simulation) {
+    std::vector<std::string> all;
+    for (const Fault& fault : simulation.verdict().faults) all.push_back(fault.code);
+    return all;
+  };
+  Scene scene = around_pole(0.075);  // 19 % too small
+  scene.environment.gravity = Vector3d::Zero();
+  Simulation tight(scene);
+  dress(tight, 1);
+  EXPECT_EQ(codes(tight), (std::vector<std::string>{"NOT_DRESSED", "NOT_AT_REST"}));
+  dress(tight, 150);
+  EXPECT_EQ(codes(tight), (std::vector<std::string>{"NOT_AT_REST", "TOO_TIGHT"}));
+
+  scene = around_pole(0.03);  // far too wide: it falls
+  scene.dressing->holds = {{0, {0, 1, 2}, 0.3}};
+  Simulation wide(scene);
+  dress(wide, 150);
+  EXPECT_EQ(codes(wide), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN"}));
+}
+
+TEST(Dressing, WeightComesInOnceSeamsAreClosed) {
+  Scene scene = around_pole(0.05);
+  scene.dressing->close = 0.5;
+  Simulation simulation(scene);
+  const double start = mean_height(simulation);
+  dress(simulation, 30);
+  EXPECT_NEAR(mean_height(simulation), start, 1e-4);
+  dress(simulation, 12);  // settled
+  const double settled = mean_height(simulation);
+  dress(simulation, 6);
+  const double t = 6.0 / 60;
+  const double v =
+      (settled - mean_height(simulation)) / t - 9.80665 * t / 2;  // it falls freely now
+  EXPECT_GT(v, 0);
+  EXPECT_LT(v, 9.80665 * 0.2);
+}
+
+TEST(Dressing, HeldParticlesKeepTheirHeightUntilTheyAreLetGo) {
+  Scene scene = around_pole(0.05);
+  std::vector<int> band;
+  for (int c = 0; c <= kTubeColumns; ++c) band.push_back(kTubeRows * (kTubeColumns + 1) + c);
+  scene.dressing->close = 0.5;
+  scene.dressing->holds = {{0, band, 0.5}};
+  Simulation simulation(scene);
+  const Matrix3Xd start = positions(simulation);
+  dress(simulation, 60);
+  Matrix3Xd x = positions(simulation);
+  double moved = 0;
+  for (const int i : band) {
+    EXPECT_NEAR(x(1, i), start(1, i), 1e-6);
+    moved = std::max(moved, std::abs(x(2, i) - start(2, i)));
+  }
+  EXPECT_GT(moved, 0.01);  // around the pole
+  dress(simulation, 20);
+  x = positions(simulation);
+  for (const int i : band) EXPECT_LT(x(1, i), start(1, i) - 0.1);
+}
+
+TEST(Dressing, CollidersAreSmallerWhileSeamsClose) {
+  Scene scene = around_pole(0.09);  // the panels start within it
+  scene.dressing->deflate = 0.02;
+  scene.dressing->close = 0.2;
+  Simulation simulation(scene);
+  const auto least = [&] {
+    const Matrix3Xd x = positions(simulation);
+    return std::sqrt((x.row(0).array().square() + x.row(2).array().square()).minCoeff());
+  };
+  dress(simulation, 12);
+  EXPECT_GT(least(), 0.07);
+  EXPECT_LT(least(), 0.085);
+  dress(simulation, 12);
+  EXPECT_GT(least(), 0.09);
+}
+
+TEST(Dressing, IsTheSameFromASnapshotAndAfterADroppedFrame) {
+  const Scene scene = around_pole(0.05);
+  Simulation simulation(scene), restored(scene);
+  dress(simulation, 20);
+  ASSERT_TRUE(restored.restore(simulation.snapshot()));
+  for (int frame = 0; frame < 60; ++frame) {
+    ASSERT_TRUE(simulation.advance_frame());
+    ASSERT_TRUE(restored.advance_frame());
+    ASSERT_EQ(hash_of(positions(restored)), hash_of(positions(simulation))) << "frame " << frame;
+    if (frame % 10 == 0) restored.release_memory();
+  }
+}
+
+TEST(Dressing, NeverRestsBeforeItIsOver) {
+  Scene scene = around_pole(0.05);
+  scene.environment.gravity = Vector3d::Zero();
+  scene.dressing->close = 2;
+  scene.sheets[0].shape = complete(TriangleMesh(*std::get<Triangles>(scene.sheets[0].shape)));
+  Simulation simulation(scene);
+  dress(simulation, 100);
+  EXPECT_FALSE(simulation.at_rest());
+}
+
+TEST(Dressing, SaysWhatIsWrongWithIt) {
+  Scene scene = around_pole(0.05);
+  scene.dressing->close = -1;
+  scene.dressing->deflate = 0.2;
+  scene.dressing->holds = {{0, {3, 100000, 3}, 0.5}, {0, {}, 0.5}};
+  scene.sheets[0].bending = ChoiKo{};
+  std::vector<std::string> fields;
+  for (const Problem& problem : find_problems(scene)) fields.push_back(problem.field);
+  EXPECT_EQ(fields, (std::vector<std::string>{"dressing.close_s", "dressing.deflate_m",
+                                              "dressing.holds[0].particles[1]",
+                                              "dressing.holds[0].particles[2]",
+                                              "dressing.holds[1].particles", "sheets[0].bending"}));
+}
+
+}  // namespace
+}  // namespace weft::testing

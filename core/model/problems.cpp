@@ -286,6 +286,10 @@ void check_dressing(const Scene& scene, Check& check) {
     const Hold& hold = dressing.holds[h];
     const std::string field = at("dressing.holds", h);
     check.number(field + ".until_s", hold.until, 0, 1000, "s");
+    if (hold.sheet < 0 || static_cast<std::size_t>(hold.sheet) >= scene.sheets.size()) {
+      check.problem(field + ".sheet", "the scene has no sheet " + std::to_string(hold.sheet));
+      continue;
+    }
     const SheetDefinition& sheet = scene.sheets[static_cast<std::size_t>(hold.sheet)];
     std::set<int> held;
     check_particles(hold.particles, sheet.particle_count(), field + ".particles",

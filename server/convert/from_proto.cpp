@@ -358,12 +358,14 @@ Dressing Reader::dressing(const v1::Dressing& from, const std::vector<SheetDefin
     const auto named = std::find_if(sheets.begin(), sheets.end(), [&](const SheetDefinition& each) {
       return each.name == given.sheet();
     });
-    if (named != sheets.end())
+    if (named != sheets.end()) {
       hold.sheet = static_cast<int>(named - sheets.begin());
-    else if (!given.sheet().empty())
-      problem(field, "the scene has no sheet \"" + given.sheet() + "\"");
-    else if (sheets.size() != 1)
-      problem(field, "is absent, and the scene has " + std::to_string(sheets.size()) + " sheets");
+    } else if (!given.sheet().empty() || sheets.size() != 1) {
+      problem(field, given.sheet().empty() ? "is absent, and the scene has " +
+                                                 std::to_string(sheets.size()) + " sheets"
+                                           : "the scene has no sheet \"" + given.sheet() + "\"");
+      stand_ins_.push_back(field);
+    }
   }
   return dressing;
 }

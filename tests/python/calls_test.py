@@ -114,6 +114,9 @@ class Plain(unittest.TestCase):
         self.assertAlmostEqual(textile.areal_density_kg_per_m2, 0.4, delta=0.1)
         self.assertEqual(session.run(time_scale=1), 14)
         self.assertEqual(session.pause(), session.get().frame + 1)
+        verdict = session.verdict()
+        self.assertEqual((verdict.frame, verdict.good), (session.get().frame, False))
+        self.assertEqual([fault.code for fault in verdict.faults], ["NOT_AT_REST"])
         self.assertIn(session.name, [each.name for each in self.server.sessions()])
         self.assertEqual(self.server.session("life").uid, session.uid)
         session.delete()
@@ -382,6 +385,7 @@ class Awaited(unittest.TestCase):
         await view.aclose()
         await session.run(time_scale=1)
         await session.pause()
+        self.assertTrue((await session.verdict()).dressed)
 
         await session.grab(5)
         await session.drag(5, (0, 0, 0), over=0.5)

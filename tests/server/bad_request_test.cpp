@@ -42,6 +42,7 @@ bool names(const std::string& at, const std::string& path, const FieldDescriptor
     return true;
   if (path.starts_with(at + "[")) return true;
   if (path == "start_frame") return at == "end_frame";  // it lies before
+  if (field.full_name() == "weft.v1.Sheet.name" && at.ends_with(".holds[0].sheet")) return true;
   const auto* oneof = field.real_containing_oneof();
   if (oneof == nullptr) return false;
   bool other = at == parent + "." + oneof->name();

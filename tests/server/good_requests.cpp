@@ -131,6 +131,16 @@ v1::Scene full_scene() {
     add_path(&collider);
   }
 
+  v1::Dressing* dressing = scene.mutable_dressing();
+  dressing->set_close_s(0.1);
+  dressing->set_settle_s(0.05);
+  dressing->set_drag_per_s(10);
+  dressing->set_deflate_m(0.001);
+  v1::Hold* hold = dressing->add_holds();
+  hold->set_sheet("all");
+  for (const int particle : {3, 4}) hold->add_particles(particle);
+  hold->set_until_s(0.2);
+
   set(scene.mutable_environment()->mutable_gravity_m_per_s2(), 0, -9.8, 0);
   v1::Wind* wind = scene.mutable_environment()->mutable_wind();
   set(wind->mutable_velocity_m_per_s(), 1, 0, 0);

@@ -4,6 +4,15 @@
 #include <cmath>
 
 namespace weft {
+namespace {
+
+// Square of the length of its longer thread, that of the flat shape being 1.
+double longest_squared(const MembraneElement& element, const Matrix3Xd& x) {
+  const Threads thread = threads_of(element, x);
+  return std::max(thread.warp.squaredNorm(), thread.weft.squaredNorm());
+}
+
+}  // namespace
 
 Threads threads_of(const MembraneElement& element, const Matrix3Xd& x) {
   Threads sum;
@@ -53,11 +62,16 @@ void add_membrane_forces(const Surface& surface, const Matrix3Xd& x, Matrix3Xd& 
 
 double largest_strain(const Surface& surface, const Matrix3Xd& x) {
   double squared = 1;
-  for (const MembraneElement& element : surface.membrane) {
-    const Threads thread = threads_of(element, x);
-    squared = std::max({squared, thread.warp.squaredNorm(), thread.weft.squaredNorm()});
-  }
+  for (const MembraneElement& element : surface.membrane)
+    squared = std::max(squared, longest_squared(element, x));
   return std::sqrt(squared) - 1;
+}
+
+VectorXd largest_strains(const Surface& surface, const Matrix3Xd& x) {
+  VectorXd strains(static_cast<Eigen::Index>(surface.membrane.size()));
+  for (Eigen::Index t = 0; const MembraneElement& element : surface.membrane)
+    strains[t++] = std::sqrt(std::max(1.0, longest_squared(element, x))) - 1;
+  return strains;
 }
 
 }  // namespace weft

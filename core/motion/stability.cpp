@@ -353,8 +353,8 @@ struct Rates {
     return stiffness[i] > 0 ? damping[i] / (2 * std::sqrt(stiffness[i])) : kInfinity;
   }
 };
-Rates largest_rates(const Mesh& mesh, const VectorXd& inverse_mass, double damping, double strain) {
-  const SurfaceBound bound = surface_bound(mesh, strain);
+Rates largest_rates(const Mesh& mesh, const VectorXd& inverse_mass, double damping,
+                    const SurfaceBound& bound) {
   VectorXd damped = VectorXd::Zero(mesh.mass.size());
   for (const Family& family : mesh.families)
     for (const auto& [i, j] : family.connections) {
@@ -365,17 +365,15 @@ Rates largest_rates(const Mesh& mesh, const VectorXd& inverse_mass, double dampi
           damped.cwiseProduct(inverse_mass)};
 }
 
-// The linear bound of triangles: that of the particle that bears least. It holds up to a strain of
-// kBoundStrain, or up to that of the shape.
+// The linear bound of triangles: that of the particle that bears least.
 struct SurfaceStep {
   double bound = kInfinity;  // s
   double damping = 0;        // of the particle that is damped most, 1/s
   int limiting_particle = -1;
 };
 SurfaceStep bounded_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
-                         double air_rate, const Matrix3Xd& x) {
-  const double strain = std::max(kBoundStrain, largest_strain(mesh, x));
-  const Rates rates = largest_rates(mesh, inverse_mass, mesh.damping, strain);
+                         double air_rate, const SurfaceBound& bound) {
+  const Rates rates = largest_rates(mesh, inverse_mass, mesh.damping, bound);
   SurfaceStep step;
   for (Eigen::Index i = 0; i < inverse_mass.size(); ++i) {
     if (inverse_mass[i] == 0) continue;
@@ -389,10 +387,13 @@ SurfaceStep bounded_step(const Mesh& mesh, const VectorXd& inverse_mass, Integra
   return step;
 }
 
-// The estimate takes the Jacobian at x.
+// The bound holds up to a strain of kBoundStrain, or up to that of the shape; the estimate takes
+// the Jacobian at x.
 StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                         double air_rate, const Matrix3Xd& x) {
-  const auto [bound, gamma, limiting] = bounded_step(mesh, inverse_mass, integrator, air_rate, x);
+  const double strain = std::max(kBoundStrain, largest_strain(mesh, x));
+  const auto [bound, gamma, limiting] =
+      bounded_step(mesh, inverse_mass, integrator, air_rate, surface_bound(mesh, strain));
   StableStep step;
   step.linear_bound = bound;
   step.limiting_particle = limiting;
@@ -404,7 +405,8 @@ StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrat
   constexpr double kCounts = 0.005, kLastChange = 0.02;
   if (integrator == IntegratorKind::kVerlet && step.estimate * gamma > kCounts)
     step.estimate = verlet_step(jacobian, stiffness, gamma, kLastChange);
-  const Rates unstrained = largest_rates(mesh, inverse_mass, mesh.damping, 0);
+  const Rates unstrained =
+      largest_rates(mesh, inverse_mass, mesh.damping, surface_bound(mesh, 0.0));
   step.connection_ratio = unstrained.damping_ratio();
   step.damping_ratio = std::isinf(step.connection_ratio) ? 0 : step.connection_ratio;
   return step;
@@ -414,7 +416,8 @@ StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrat
 
 double linear_bound(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                     double air_rate, const Matrix3Xd& x) {
-  return bounded_step(mesh, inverse_mass, integrator, air_rate, x).bound;
+  const VectorXd strains = largest_strains(mesh.surface, x).cwiseMax(kBoundStrain);
+  return bounded_step(mesh, inverse_mass, integrator, air_rate, surface_bound(mesh, strains)).bound;
 }
 
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
@@ -451,7 +454,8 @@ StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrato
 
 double damping_for(const Mesh& mesh, double ratio) {
   if (!mesh.surface.membrane.empty()) {
-    const double unit = largest_rates(mesh, mesh.mass.cwiseInverse(), 1, 0).damping_ratio();
+    const double unit =
+        largest_rates(mesh, mesh.mass.cwiseInverse(), 1, surface_bound(mesh, 0.0)).damping_ratio();
     return unit > 0 && unit < kInfinity ? ratio / unit : 0;
   }
   Operator<1> graph = graph_of(mesh, mesh.mass.cwiseInverse(), 1, 0);

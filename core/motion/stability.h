@@ -23,7 +23,8 @@ struct StableStep {
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                        double air_rate, const Matrix3Xd& x);
 
-// The linear bound of triangles alone, in a fraction of the time, s.
+// The linear bound of triangles alone, in a fraction of the time, where each is strained by no more
+// than kBoundStrain or as much as at x, s.
 double linear_bound(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                     double air_rate, const Matrix3Xd& x);
 

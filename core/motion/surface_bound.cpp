@@ -38,11 +38,16 @@ double stiffness_bound(const MembraneElement& element, const MembraneStiffness& 
 }
 
 SurfaceBound surface_bound(const Mesh& mesh, double strain) {
+  const auto triangles = static_cast<Eigen::Index>(mesh.surface.membrane.size());
+  return surface_bound(mesh, VectorXd::Constant(triangles, strain));
+}
+
+SurfaceBound surface_bound(const Mesh& mesh, const VectorXd& strains) {
   SurfaceBound bound{VectorXd::Zero(mesh.mass.size()), VectorXd::Zero(mesh.mass.size())};
   const Surface& surface = mesh.surface;
-  for (const MembraneElement& element : surface.membrane) {
-    const double most =
-        stiffness_bound(element, surface.stretch[static_cast<std::size_t>(element.panel)], strain);
+  for (Eigen::Index t = 0; const MembraneElement& element : surface.membrane) {
+    const MembraneStiffness& stiffness = surface.stretch[static_cast<std::size_t>(element.panel)];
+    const double most = stiffness_bound(element, stiffness, strains[t++]);
     for (const int i : element.particle) bound.membrane[i] += most;
   }
   for (const CurvatureFit& fit : surface.fits) {

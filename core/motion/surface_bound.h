@@ -24,6 +24,8 @@ struct SurfaceBound {
   VectorXd membrane, bend;
 };
 SurfaceBound surface_bound(const Mesh& mesh, double strain);
+// With a strain of each triangle.
+SurfaceBound surface_bound(const Mesh& mesh, const VectorXd& strains);
 
 // Steps in which a triangle alone would be stable, s, with the mass that its corners have of it.
 std::vector<double> triangle_steps(const Mesh& mesh, double strain);

@@ -55,8 +55,8 @@ std::string session_of(const Message& request) {
 
 bool is_repeatable(const Message& request) {
   const std::string& type = request.GetDescriptor()->name();
-  constexpr std::array kHarmless{"Get",        "List",        "StreamFrames",
-                                 "ViewFrames", "UploadAsset", "DownloadAsset"};
+  constexpr std::array kHarmless{"Get",         "List",          "StreamFrames", "ViewFrames",
+                                 "UploadAsset", "DownloadAsset", "BuildGarment"};
   return !text_in(request, "request_id").empty() ||
          std::any_of(kHarmless.begin(), kHarmless.end(),
                      [&](const char* verb) { return type.starts_with(verb); });

@@ -190,7 +190,8 @@ Connection::Connection(std::shared_ptr<Embedded> server, std::shared_ptr<const D
       channel_(std::move(channel)),
       stubs_(v1::SessionService::NewStub(channel_), v1::FrameService::NewStub(channel_),
              v1::TextileService::NewStub(channel_), v1::ServerService::NewStub(channel_),
-             v1::LabService::NewStub(channel_), v1::AssetService::NewStub(channel_)) {}
+             v1::LabService::NewStub(channel_), v1::AssetService::NewStub(channel_),
+             v1::GarmentService::NewStub(channel_)) {}
 
 Connection::~Connection() = default;
 

@@ -13,6 +13,7 @@
 #include "client/problem.h"
 #include "weft/v1/asset.grpc.pb.h"
 #include "weft/v1/frame.grpc.pb.h"
+#include "weft/v1/garment.grpc.pb.h"
 #include "weft/v1/lab.grpc.pb.h"
 #include "weft/v1/server.grpc.pb.h"
 #include "weft/v1/session.grpc.pb.h"
@@ -110,7 +111,8 @@ class Connection {
   std::shared_ptr<grpc::Channel> channel_;
   std::tuple<std::unique_ptr<v1::SessionService::Stub>, std::unique_ptr<v1::FrameService::Stub>,
              std::unique_ptr<v1::TextileService::Stub>, std::unique_ptr<v1::ServerService::Stub>,
-             std::unique_ptr<v1::LabService::Stub>, std::unique_ptr<v1::AssetService::Stub>>
+             std::unique_ptr<v1::LabService::Stub>, std::unique_ptr<v1::AssetService::Stub>,
+             std::unique_ptr<v1::GarmentService::Stub>>
       stubs_;
 };
 

@@ -131,6 +131,8 @@ void add_options(CLI::App& app, Context& context) {
 void add_commands(CLI::App& app, Context& context) {
   add_scene(app, context);
   add_body(app, context);
+  add_garment(app, context);
+  add_drape(app, context);
   add_session(app, context);
   add_textile(app, context);
   add_lab(app, context);

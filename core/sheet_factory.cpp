@@ -22,6 +22,11 @@ void ease_rest_shape(const SheetDefinition& sheet, double share, Mesh& mesh) {
   if (std::holds_alternative<Triangles>(sheet.shape)) ease(sheet, share, mesh);
 }
 
+std::vector<bool> triangles_at_open_seams(const SheetDefinition& sheet) {
+  if (!std::holds_alternative<Triangles>(sheet.shape)) return {};
+  return stretched_at_start(sheet);
+}
+
 StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,
                           const VectorXd& inverse_mass, IntegratorKind integrator, double air_rate,
                           const Matrix3Xd& x) {

@@ -17,6 +17,8 @@ Mesh make_mesh(const SheetDefinition& sheet);
 // Gives a mesh, made of the sheet, a rest shape between that of its start (share 0) and its flat
 // one (1). Of a lattice they are the same.
 void ease_rest_shape(const SheetDefinition& sheet, double share, Mesh& mesh);
+// Which of its triangles start along seams that are to close; empty: none.
+std::vector<bool> triangles_at_open_seams(const SheetDefinition& sheet);
 
 // As stable_step() and damping_for(); of a large lattice by samples of it.
 StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,

@@ -266,11 +266,24 @@ Simulation::State::State(Scene given, SolverFactory factory)
     sheets[s].solver->start(x[s], v, 0, dt);
     sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
   }
-  if (scene.cloth_contact) {
-    cloth_contact.emplace(scene);
-    if (auto tangled = find_tangles(scene, x)) plan.warnings.push_back(std::move(*tangled));
-  }
+  make_cloth_contact();
+  if (scene.cloth_contact)
+    if (auto tangled = find_tangles(scene, x, open_seams()))
+      plan.warnings.push_back(std::move(*tangled));
   forget_motion();
+}
+
+void Simulation::State::make_cloth_contact() {
+  if (scene.cloth_contact) cloth_contact.emplace(scene, open_seams());
+}
+
+// Triangles that reach from one panel to another pass through what lies between.
+LeftOut Simulation::State::open_seams() const {
+  LeftOut open;
+  if (sheets.front().dressing.ease < 1)
+    for (const SheetDefinition& sheet : scene.sheets)
+      open.push_back(triangles_at_open_seams(sheet));
+  return open;
 }
 
 int Simulation::State::particle_count() const {
@@ -291,7 +304,7 @@ void Simulation::State::release_memory() {
 void Simulation::State::restore_memory() {
   if (!released) return;
   for (std::size_t s = 0; s < sheets.size(); ++s) sheets[s].restore_memory(scene, capped(s));
-  if (scene.cloth_contact) cloth_contact.emplace(scene);
+  make_cloth_contact();
   released = false;
 }
 

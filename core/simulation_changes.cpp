@@ -121,10 +121,12 @@ bool Simulation::State::change_dressing() {
 }
 
 void Simulation::State::dress(const DressingState& state) {
+  const bool was_closed = sheets.front().dressing.ease == 1;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     sheets[s].dress(scene, capped(s), state);
     sheets[s].solver = make_solver(scene, simulated(s), sheets[s].mesh, sheets[s].dynamics);
   }
+  if (was_closed != (state.ease == 1)) make_cloth_contact();
 }
 
 // To what sheets of triangles bear as they are, where no step is asked for.

@@ -50,6 +50,8 @@ struct Simulation::State {
   State(Scene given, SolverFactory factory);
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
   int particle_count() const;
+  void make_cloth_contact();
+  LeftOut open_seams() const;
   void release_memory();
   void restore_memory();
   SheetDefinition capped(std::size_t sheet) const;

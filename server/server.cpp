@@ -17,6 +17,7 @@
 #include "server/rpc/backend.h"
 #include "server/rpc/find.h"
 #include "server/rpc/frame_service.h"
+#include "server/rpc/garment_service.h"
 #include "server/rpc/lab_service.h"
 #include "server/rpc/metrics.h"
 #include "server/rpc/restore.h"
@@ -33,7 +34,8 @@ constexpr std::array kServices = {"",
                                   "weft.v1.FrameService",
                                   "weft.v1.ServerService",
                                   "weft.v1.TextileService",
-                                  "weft.v1.LabService"};
+                                  "weft.v1.LabService",
+                                  "weft.v1.GarmentService"};
 
 // For calls that are answered at once, when gRPC is shut down.
 constexpr std::chrono::milliseconds kGrace{200}, kNoGrace{0};
@@ -113,6 +115,7 @@ struct Server::Parts {
   ServerService server{backend};
   TextileService textiles{backend.access};
   LabService lab{backend};
+  GarmentService garments{backend};
   std::unique_ptr<grpc::Server> grpc;
   std::optional<Metrics> metrics;
   std::jthread eviction, sweeping;
@@ -130,6 +133,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
   builder.RegisterService(&parts_->server);
   builder.RegisterService(&parts_->textiles);
   builder.RegisterService(&parts_->lab);
+  builder.RegisterService(&parts_->garments);
   int port = 0;
   if (options.host) {
     builder.AddListeningPort(*options.host + ":" + std::to_string(options.port),
@@ -166,6 +170,7 @@ Server::~Server() {
   // the scenes that they are at still need the services
   parts_->backend.planner.stop();
   parts_->backend.large_planner.stop();
+  parts_->backend.garments.stop();
   parts_->backend.store_calls.stop();
   parts_->backend.asset_calls.stop();
   parts_->backend.scheduler.stop();  // and sessions the store
@@ -205,6 +210,7 @@ void Server::stop(std::chrono::milliseconds deadline) {
   parts_->sessions.drain();
   parts_->backend.planner.drain();
   parts_->backend.large_planner.drain();
+  parts_->backend.garments.drain();
   parts_->backend.store_calls.drain();
   parts_->backend.asset_calls.drain();
   parts_->lab.drain();

@@ -10,7 +10,7 @@ namespace weft::client {
 namespace {
 
 struct BodyOptions {
-  Measures measures;
+  Person person;
   std::string path;
   bool replace = false;
 };
@@ -19,7 +19,7 @@ void run_new_body(Context& context, const BodyOptions& options) {
   const bool binary = options.path.ends_with(".glb");
   if (!binary && !options.path.ends_with(".obj"))
     throw usage_problem("--output " + options.path + ": ends in neither .glb nor .obj");
-  const DressForm form = make_dress_form(options.measures);
+  const DressForm form = make_dress_form(measures_of(options.person));
   write_new_file(options.path, binary ? glb_of(form.mesh) : obj_of(form.mesh), options.replace);
 
   std::string text = fmt::format("stature     {:.3f} m\n", form.stature);
@@ -43,20 +43,20 @@ void run_new_body(Context& context, const BodyOptions& options) {
 
 }  // namespace
 
-void add_body(CLI::App& app, Context& context) {
+void add_person(CLI::App& command, Person& person) {
   const std::map<std::string, FigureKind> figures{{"female", FigureKind::kFemale},
                                                   {"male", FigureKind::kMale}};
-  CLI::App* body = add_group(app, "body", "Make bodies for cloth to be worn by");
-  auto options = std::make_shared<BodyOptions>();
-  Measures& measures = options->measures;
-  CLI::App* command =
-      body->add_subcommand("new", "Write a dress form by the tape: a standing, closed figure");
-  command->add_option("--figure", measures.figure, "Of the form; else female")
+  Measures& measures = person.measures;
+  command.add_option("--figure", measures.figure, "Of the body; else female")
       ->transform(one_of(figures))
       ->option_text("female|male");
+  command
+      .add_option("--size", person.size,
+                  "As in shops, such as 40 of a woman, 50 of a man; gives the girths not given")
+      ->type_name("N");
   const auto length = [&](const char* name, std::optional<double>& value, const char* description,
                           double least, double most) {
-    command->add_option(name, value, description)->type_name("M")->check(CLI::Range(least, most));
+    command.add_option(name, value, description)->type_name("M")->check(CLI::Range(least, most));
   };
   length("--stature", measures.stature, "Height of the person, m", 1.2, 2.2);
   length("--bust", measures.bust, "Bust or chest girth, m", 0.6, 1.8);
@@ -64,9 +64,32 @@ void add_body(CLI::App& app, Context& context) {
   length("--waist", measures.waist, "Waist girth, m", 0.45, 1.8);
   length("--top-hip", measures.top_hip, "Top hip girth, m", 0.55, 1.8);
   length("--hip", measures.hip, "Hip girth, m", 0.6, 1.9);
-  command->add_option("--arm-angle", measures.arm_angle, "Of the arms below the level, degrees")
+  command.add_option("--arm-angle", measures.arm_angle, "Of the arms below the level, degrees")
       ->type_name("DEG")
       ->check(CLI::Range(0.0, 70.0));
+}
+
+Measures measures_of(const Person& person) {
+  Measures measures = person.measures;
+  if (!person.size) return measures;
+  const bool female = measures.figure == FigureKind::kFemale;
+  const int least = female ? kLeastFemaleSize : kLeastMaleSize,
+            most = female ? kMostFemaleSize : kMostMaleSize;
+  if (*person.size < least || *person.size > most || *person.size % 2 != 0)
+    throw usage_problem(fmt::format("--size: {} is not even and within {} to {}, sizes of a {}",
+                                    *person.size, least, most, female ? "woman" : "man"));
+  const Measures usual = measures_of_size(measures.figure, *person.size);
+  for (const auto girth : {&Measures::bust, &Measures::waist, &Measures::hip})
+    if (!(measures.*girth)) measures.*girth = usual.*girth;
+  return measures;
+}
+
+void add_body(CLI::App& app, Context& context) {
+  CLI::App* body = add_group(app, "body", "Make bodies for cloth to be worn by");
+  auto options = std::make_shared<BodyOptions>();
+  CLI::App* command =
+      body->add_subcommand("new", "Write a dress form by the tape: a standing, closed figure");
+  add_person(*command, options->person);
   command->add_option("-o,--output", options->path, "File to write: .glb or .obj")
       ->type_name("FILE")
       ->required();
@@ -75,6 +98,7 @@ void add_body(CLI::App& app, Context& context) {
 Girths are those of ISO 8559-1; what is not given follows from the rest. The form
 has its feet at y = 0 and looks along z.
   weft body new --figure female --bust 0.92 --waist 0.74 --hip 1.0 -o body.glb
+  weft body new --size 44 -o body.obj
   weft scene new --mesh dress.obj --body body.glb -o scene.json
 )");
   command->callback([&context, options] { run_new_body(context, *options); });

@@ -9,12 +9,15 @@
 #include <vector>
 
 #include "client/context.h"
+#include "client/figures/dress_form.h"
 #include "client/recording/frame_range.h"
 
 namespace weft::client {
 
 // Each adds one command to the command line; parsing runs it.
 void add_body(CLI::App& app, Context& context);
+void add_garment(CLI::App& app, Context& context);
+void add_drape(CLI::App& app, Context& context);
 void add_scene(CLI::App& app, Context& context);
 void add_session(CLI::App& app, Context& context);
 void add_textile(CLI::App& app, Context& context);
@@ -76,6 +79,15 @@ CLI::Validator one_of(const std::map<std::string, Value>& values) {
   };
   return {find, "", ""};
 }
+
+// Whom a body or a garment is for, by options.
+struct Person {
+  Measures measures;
+  std::optional<int> size{};
+};
+void add_person(CLI::App& command, Person& person);
+// With those of the size where they are not given.
+Measures measures_of(const Person& person);
 
 // The positional SESSION.
 void add_session_argument(CLI::App& command, std::string& session);

@@ -83,6 +83,34 @@ bounds, and what it is when it is absent):
 
 A field that does not exist is an error with its line. NaN is refused.
 )"},
+    Topic{"garments", "Patterns, what they hold, and how they become sheets",
+          R"(A pattern file is the protobuf JSON of weft.v1.Pattern: panels and seams, in m.
+A panel is a piece as it is cut:
+  name       what seams call it
+  edges      its outline, anticlockwise as seen from outside. Each begins where
+             the one before ends; points_m has its end, after one or two control
+             points of a curve, or with arc: true a point that an arc of a
+             circle passes. label: what it is for, such as "waist"
+  grain_rad  from the v axis to the warp
+  placement  where it stands around the body before it is sewn; unplaced its u
+             runs along x, its v along y, and its outside looks to +z
+  textile    its own; else the sheet's
+A seam joins a first_side and a second_side, each of runs of edges one after the
+other: {"panel": "front", "edge": 1}, or with begin and end a part of that edge.
+The second side runs against the first, as panels with the same side outward
+do; same_direction turns one of them over. Of sides of two lengths the longer
+one is gathered evenly. A dart is a notch whose sides are sewn.
+
+  weft garment new tshirt --size 40 -o tshirt.json    by the tape, or by size
+  weft garment import pattern.json -o mine.json       of GarmentCode
+  weft garment build mine.json                        what is noteworthy
+  weft garment build mine.json --body form.obj -o scene.json
+
+Both sides of a seam get equal numbers of particles, which are one from the
+start: triangles along seams begin stretched until the cloth draws them
+together. Inside, triangles are equilateral and lie along the grain; a panel
+that is symmetric about u = constant has symmetric ones.
+)"},
     Topic{"recordings", "Files that hold frames, and what can be done with them",
           R"(A recording holds frames of a session as they were streamed, to the bit, with
 its scene: one SQLite file, usually *.weft, each frame with a checksum.

@@ -217,6 +217,12 @@ double from_blob(const Vector3d& p, const Blob& blob) {
   return k * (k - 1) / std::max(q.cwiseQuotient(blob.radii).norm(), 1e-9);
 }
 
+// Of the left arm so many degrees below the level.
+Vector3d arm_direction(double degrees) {
+  const double angle = degrees * std::numbers::pi / 180;
+  return Vector3d(std::cos(angle), -std::sin(angle), 0.06).normalized();
+}
+
 // Roughly the distance from a figure, negative inside. It is as its mirror image in x = 0.
 class FigureShape {
  public:
@@ -235,8 +241,7 @@ class FigureShape {
             plan.leg, &Round::along, [](const Round& r) { return r.radius; }, 0)),
         arm_radius_(curve(
             plan.arm, &Round::along, [](const Round& r) { return r.radius; }, 0)) {
-    const double angle = arm_angle * std::numbers::pi / 180;
-    arm_ = Vector3d(std::cos(angle), -std::sin(angle), 0.06).normalized();
+    arm_ = arm_direction(arm_angle);
   }
 
   double operator()(const Vector3d& point) const {
@@ -390,6 +395,20 @@ void scale(FigurePlan& plan, double tall, double wide) {
 
 }  // namespace
 
+Measures measures_of_size(FigureKind figure, int size) {
+  Measures measures{.figure = figure};
+  const bool female = figure == FigureKind::kFemale;
+  measures.bust = female ? 0.02 * size + 0.12 : 0.02 * size;
+  measures.waist = female ? 0.02 * size - 0.04 : 0.02 * size - 0.12;
+  measures.hip = female ? 0.015 * size + 0.4 : 0.02 * size + 0.04;
+  return measures;
+}
+
+const DressForm::Girth& DressForm::girth(const std::string& name) const {
+  return *std::find_if(girths.begin(), girths.end(),
+                       [&](const Girth& each) { return each.name == name; });
+}
+
 DressForm make_dress_form(const Measures& measures) {
   constexpr double kCell = 0.012;  // m
   FigurePlan plan = measures.figure == FigureKind::kFemale ? female() : male();
@@ -442,6 +461,16 @@ DressForm make_dress_form(const Measures& measures) {
     }
     if (worst < kClose) break;
   }
+
+  const auto widest = [](const Round& a, const Round& b) { return a.radius < b.radius; };
+  form.arm = {plan.shoulder, arm_direction(measures.arm_angle), plan.arm.back().along,
+              std::max_element(plan.arm.begin() + 1, plan.arm.end(), widest)->radius};
+  const Round& thigh = *std::max_element(plan.leg.begin(), plan.leg.end(), widest);
+  form.leg = {
+      {thigh.side, thigh.along, thigh.forward}, -Vector3d::UnitY(), thigh.along, thigh.radius};
+  form.neck_height = section_of(plan, "neck base").height;
+  form.neck_girth = section_of(plan, "neck base").girth;
+  form.crotch_height = section_of(plan, "crotch").height;
   return form;
 }
 

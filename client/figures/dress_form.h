@@ -17,6 +17,13 @@ struct Measures {
   double arm_angle = 40;  // below the level, degrees
 };
 
+// Sizes of shops, by which bust, waist and hip girths follow from a number.
+inline constexpr int kLeastFemaleSize = 32, kMostFemaleSize = 54;
+inline constexpr int kLeastMaleSize = 42, kMostMaleSize = 62;
+// A person of that size, even and within those of the figure: 40 of a woman has 0.92, 0.76 and
+// 1.00 m, 50 of a man 1.00, 0.88 and 1.04 m, as German shops count.
+Measures measures_of_size(FigureKind figure, int size);
+
 // A standing figure with its feet at y = 0 that looks along z, without face, fingers or toes.
 struct DressForm {
   struct Girth {
@@ -24,9 +31,21 @@ struct DressForm {
     double wanted, found;  // m
     double height;         // where the tape lies, m
   };
+  // An arm or leg, m.
+  struct Limb {
+    Vector3d top = Vector3d::Zero();        // its joint, of the left one
+    Vector3d direction = Vector3d::Zero();  // to the hand or foot, of length 1
+    double length = 0;
+    double radius = 0;  // of an upper arm, or thigh, at its widest
+  };
   FigureMesh mesh;
   double stature = 0;  // m
   std::vector<Girth> girths;
+  Limb arm, leg;
+  double neck_height = 0, neck_girth = 0;  // at its base, m
+  double crotch_height = 0;                // m
+
+  const Girth& girth(const std::string& name) const;  // one of `girths`
 };
 DressForm make_dress_form(const Measures& measures);
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <span>
 
 namespace weft {
@@ -79,7 +78,7 @@ std::vector<double> thickness_at_particles(const SheetDefinition& sheet) {
   return thickness;
 }
 
-Cloth::Cloth(const std::vector<SheetDefinition>& sheets) {
+Cloth::Cloth(const std::vector<SheetDefinition>& sheets, const LeftOut& left_out) {
   first_particle.push_back(0);
   first_block.push_back(0);
   int pieces = 0;
@@ -98,12 +97,14 @@ Cloth::Cloth(const std::vector<SheetDefinition>& sheets) {
       centers.emplace_back(local_position(definition.shape, a) +
                            local_position(definition.shape, b) +
                            local_position(definition.shape, c));
-    std::vector<int> order(given.size());
-    std::iota(order.begin(), order.end(), 0);
+    const bool all = left_out.empty() || left_out[s].empty();
+    std::vector<int> order;
     std::vector<std::size_t> sizes;
-    for (std::size_t begin = 0; const std::size_t count : pieces_of(definition.shape)) {
-      divide_block(std::span(order).subspan(begin, count), centers, sizes);
-      begin += count;
+    for (int t = 0; const std::size_t count : pieces_of(definition.shape)) {
+      const std::size_t begin = order.size();
+      for (const int end = t + static_cast<int>(count); t < end; ++t)
+        if (all || !left_out[s][static_cast<std::size_t>(t)]) order.push_back(t);
+      if (order.size() > begin) divide_block(std::span(order).subspan(begin), centers, sizes);
       for (const std::size_t size : sizes)
         first_block.push_back(first_block.back() + static_cast<int>(size));
       piece.resize(first_block.size() - 1, pieces++);

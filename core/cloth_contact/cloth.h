@@ -7,10 +7,13 @@
 
 namespace weft {
 
+// Triangles that meet nothing: of each sheet, of each of its triangles; empty: none do.
+using LeftOut = std::vector<std::vector<bool>>;
+
 // All sheets of a scene as one surface. Particles are numbered through all sheets, in their order;
 // triangles lie in blocks of neighbours, edges and particles with the first triangle that has them.
 struct Cloth {
-  explicit Cloth(const std::vector<SheetDefinition>& sheets);
+  explicit Cloth(const std::vector<SheetDefinition>& sheets, const LeftOut& left_out = {});
 
   int particles() const { return first_particle.back(); }
   int sheet_of(int particle) const { return sheet[static_cast<std::size_t>(particle)]; }

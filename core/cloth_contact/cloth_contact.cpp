@@ -17,8 +17,8 @@ constexpr double kWindowReach = 0.25, kLeastReach = 0.02;
 
 }  // namespace
 
-ClothContact::ClothContact(const Scene& scene)
-    : scene_(scene), cloth_(scene.sheets), lists_(cloth_) {
+ClothContact::ClothContact(const Scene& scene, const LeftOut& left_out)
+    : scene_(scene), cloth_(scene.sheets, left_out), lists_(cloth_) {
   place_.assign(static_cast<std::size_t>(cloth_.particles()), -1);
   forget();
 }

@@ -19,7 +19,7 @@ namespace weft {
 class ClothContact {
  public:
   // Holds on to the scene.
-  explicit ClothContact(const Scene& scene);
+  explicit ClothContact(const Scene& scene, const LeftOut& left_out = {});
 
   // Sheets may be anywhere now, or be held otherwise, at the begin of a frame. Nothing that was
   // found before is used, nor kept in memory.

@@ -42,8 +42,9 @@ std::string describe_near(const Scene& scene, const Cloth& cloth, const ClothPai
 
 }  // namespace
 
-std::optional<Warning> find_tangles(const Scene& scene, const std::vector<Matrix3Xd>& x) {
-  const Cloth cloth(scene.sheets);
+std::optional<Warning> find_tangles(const Scene& scene, const std::vector<Matrix3Xd>& x,
+                                    const LeftOut& left_out) {
+  const Cloth cloth(scene.sheets, left_out);
   const Matrix3Xd all = cloth.positions(x);
   NearBlocks blocks(cloth);
   blocks.set(all);

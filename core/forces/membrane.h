@@ -29,8 +29,8 @@ MembraneStrain stress(const MembraneStiffness& stiffness, const MembraneStrain& 
 double membrane_energy(const Surface& surface, const Matrix3Xd& x);
 void add_membrane_forces(const Surface& surface, const Matrix3Xd& x, Matrix3Xd& force);
 
-// Largest l / L - 1 of a thread of warp or weft, 0 where none is stretched: of all triangles, and of
-// each.
+// Largest l / L - 1 of a thread of warp or weft, 0 where none is stretched: of all triangles, and
+// of each.
 double largest_strain(const Surface& surface, const Matrix3Xd& x);
 VectorXd largest_strains(const Surface& surface, const Matrix3Xd& x);
 

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/triangles/rest_shape.h"
+#include "core/triangles/triangles.h"
+
 namespace weft {
 namespace {
 
@@ -25,6 +28,15 @@ Eigen::SelfAdjointEigenSolver<Matrix2d> squared_stretch(const MembraneElement& e
 }
 
 }  // namespace
+
+std::vector<bool> stretched_at_start(const SheetDefinition& sheet) {
+  constexpr double kStretch = 1.5;
+  const Matrix3Xd x = start_positions(sheet);
+  std::vector<bool> stretched;
+  for (const MembraneElement& element : make_membrane(rest_shape(triangles_in(sheet))))
+    stretched.push_back(squared_stretch(element, x).eigenvalues().maxCoeff() > kStretch * kStretch);
+  return stretched;
+}
 
 void ease(const SheetDefinition& sheet, double share, Mesh& mesh) {
   const Matrix3Xd x = start_positions(sheet);

@@ -12,4 +12,7 @@ namespace weft {
 // Precondition: the sheet is of triangles.
 void ease(const SheetDefinition& sheet, double share, Mesh& mesh);
 
+// Which triangles start stretched by half or more: those along seams that are to close.
+std::vector<bool> stretched_at_start(const SheetDefinition& sheet);
+
 }  // namespace weft

@@ -51,6 +51,14 @@ std::vector<Point> points_of(const std::string& bytes) {
   return points;
 }
 
+template <class Point>
+std::string planes_of(const std::vector<Point>& points) {
+  std::vector<float> planes;
+  for (Eigen::Index axis = 0; axis < Point::RowsAtCompileTime; ++axis)
+    for (const Point& point : points) planes.push_back(static_cast<float>(point[axis]));
+  return bytes_of(planes);
+}
+
 // Indices that no int holds are negative: out of range.
 std::vector<std::array<int, 3>> triangles_of(const std::string& bytes) {
   return values_of<std::array<int, 3>>(bytes);
@@ -214,10 +222,13 @@ v1::MeshData topology_of(const SheetShape& shape) {
       flat.emplace_back(at.z(), at.x());
     }
   }
-  std::vector<float> planes;
-  for (const Eigen::Index axis : {0, 1})
-    for (const Vector2d& corner : flat) planes.push_back(static_cast<float>(corner[axis]));
-  to.set_flat_m(bytes_of(planes));
+  to.set_flat_m(planes_of(flat));
+  return to;
+}
+
+v1::MeshData to_proto(const Triangles& mesh) {
+  v1::MeshData to = topology_of(mesh);
+  to.set_positions_m(planes_of(mesh->start));
   return to;
 }
 

@@ -24,6 +24,8 @@ std::vector<Problem> find_problems(const v1::MeshData& mesh, const std::string& 
 // Triangles, flat shape and panels of a sheet, without positions.
 v1::MeshData topology_of(const SheetShape& shape);
 
+v1::MeshData to_proto(const Triangles& mesh);
+
 // Particles of a mesh, whatever else is wrong with it.
 std::int64_t particles_of(const v1::MeshData& mesh);
 

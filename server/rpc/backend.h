@@ -72,6 +72,7 @@ struct Backend {
   Scheduler scheduler;
   SlowCalls planner{"creations", "too many sessions are being created"};
   SlowCalls large_planner{"creations", "too many large sessions are being created"};
+  SlowCalls garments{"garments", "too many garments are being built"};
   SlowCalls store_calls{"store_calls", "too many calls wait for the store"};
   SlowCalls asset_calls{"asset_calls", "too many calls wait for assets"};
   std::mutex claiming;

@@ -269,6 +269,22 @@ class Plain(unittest.TestCase):
         self.assertGreater(self.server.info().limits.max_sessions, 0)
         self.assertGreater(self.server.stats().uptime_s, 0)
 
+    def test_patterns_are_cut_and_sewn(self):
+        outline = [weft.PatternEdge([corner]) for corner in ((0.3, 0), (0.3, 0.2), (0, 0.2), (0, 0))]
+        tube = weft.Pattern(
+            [weft.PatternPanel("tube", outline)],
+            [weft.PatternSeam([weft.EdgeRun("tube", 1)], [weft.EdgeRun("tube", 3)])])
+        built = self.server.build_garment(tube, 0.02)
+        self.assertEqual(list(built.edges[1].particles), list(built.edges[3].particles)[::-1])
+        sheet = weft.Sheet.from_proto(built.sheet)
+        sheet.textile = weft.Textile.preset("denim_11oz")
+        self.server.check(weft.Scene([sheet]))
+        tube.panels[0].edges[2].points_m = [(0, float("nan"))]
+        with self.assertRaises(weft.InvalidArgument) as refused:
+            self.server.build_garment(tube)
+        self.assertEqual(refused.exception.violations[0].field,
+                         "pattern.panels[0].edges[2].points_m")
+
     def test_scenes_are_the_scene_files(self):
         with tempfile.TemporaryDirectory() as directory:
             for template in "hang", "sphere", "box", "flag":
@@ -430,6 +446,10 @@ class Awaited(unittest.TestCase):
         report = await server.run_test(
             "BENDING", weft.Textile.preset("denim_11oz"), spacings_m=[0.01])
         self.assertTrue(report.curves)
+        corners = [(0.1, 0), (0, 0.1), (0, 0)]
+        panel = weft.PatternPanel("kite", [weft.PatternEdge([each]) for each in corners])
+        built = await server.build_garment(weft.Pattern([panel]), edge_m=0.05)
+        self.assertEqual([len(each.particles) for each in built.edges], [3, 4, 3])
         self.assertGreater((await server.info()).limits.max_sessions, 0)
         self.assertGreater((await server.stats()).uptime_s, 0)
 

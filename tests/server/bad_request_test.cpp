@@ -43,6 +43,8 @@ bool names(const std::string& at, const std::string& path, const FieldDescriptor
   if (path.starts_with(at + "[")) return true;
   if (path == "start_frame") return at == "end_frame";  // it lies before
   if (field.full_name() == "weft.v1.Sheet.name" && at.ends_with(".holds[0].sheet")) return true;
+  // it sews what is not there any more
+  if (path.starts_with("pattern.panels") && at.starts_with("pattern.seams")) return true;
   const auto* oneof = field.real_containing_oneof();
   if (oneof == nullptr) return false;
   bool other = at == parent + "." + oneof->name();
@@ -131,7 +133,8 @@ class Subject {
   static bool reads_only(const MethodDescriptor& method) {
     const std::string& name = method.name();
     return name.starts_with("Get") || name.starts_with("List") || name.starts_with("Download") ||
-           name == "StreamFrames" || name == "ViewFrames" || name == "RunTest";
+           name == "StreamFrames" || name == "ViewFrames" || name == "RunTest" ||
+           name == "BuildGarment";
   }
 
   // As it was at first, whatever was changed.

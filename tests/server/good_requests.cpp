@@ -10,6 +10,7 @@
 #include "tests/support/service/assets.h"
 #include "tests/support/service/service.h"
 #include "weft/v1/frame.pb.h"
+#include "weft/v1/garment.pb.h"
 #include "weft/v1/lab.pb.h"
 #include "weft/v1/session.pb.h"
 
@@ -210,6 +211,18 @@ std::vector<std::string> known_requests(const std::string& type) {
       {"RunTestRequest",
        "test: LAB_TEST_TENSILE textile { preset: 'wool_tropical' } bending { isometric {} } "
        "direction: LAB_DIRECTION_WARP spacings_m: 0.01 mesh: LAB_MESH_IRREGULAR"},
+      {"BuildGarmentRequest",
+       "pattern { panels { name: 'front' edges { points_m: [0.2, 0.02] label: 'hem' } "
+       "edges { points_m: [0.25, 0.15, 0.2, 0.3] arc: true } edges { points_m: [0, 0.3] } "
+       "edges { points_m: [0, 0] } grain_rad: 0.1 placement { origin_m { x: 0.1 y: 1 z: 0.2 } "
+       "rotation { w: 1 x: 0.1 y: 0.2 z: 0.3 } } textile { measured { areal_density_kg_per_m2: 0.2 "
+       "tensile_warp_n_per_m: 100 tensile_weft_n_per_m: 110 shear_n_per_m: 10 "
+       "bend_rigidity_warp_n_m: 1e-5 bend_rigidity_weft_n_m: 2e-5 air_drag_kg_per_m2_s: 0.1 } "
+       "friction_coefficient: 0.4 damping_kg_per_s: 1e-4 } } "
+       "panels { name: 'back' edges { points_m: [0.2, 0] } edges { points_m: [0.2, 0.3] } "
+       "edges { points_m: [0, 0.3] } edges { points_m: [0, 0] } textile { preset: 'denim_11oz' } } "
+       "seams { first_side { panel: 'front' edge: 3 begin: 0.1 end: 0.9 } "
+       "second_side { panel: 'back' edge: 1 begin: 0.2 end: 0.9 } } } edge_m: 0.05"},
   };
   std::vector<std::string> texts;
   const auto [first, last] = known.equal_range(type);

@@ -29,6 +29,7 @@ from .scene import (
     LabTest,
     MeshData,
     MoveCollider,
+    Pattern,
     PinParticle,
     Release,
     Scene,
@@ -37,7 +38,8 @@ from .scene import (
     Vector3,
     action_proto,
 )
-from .v1 import asset_pb2, frame_pb2, lab_pb2, server_pb2, session_pb2, textile_pb2
+from .v1 import asset_pb2, frame_pb2, garment_pb2, lab_pb2, server_pb2, session_pb2
+from .v1 import textile_pb2
 
 
 def connect(
@@ -154,6 +156,14 @@ class Server:
         request = textile_pb2.GetTextileRequest(name=calls.textile_name(name))
         preset: textile_pb2.TextilePreset = await self.call(request)
         return preset
+
+    async def build_garment(
+        self, pattern: Pattern, edge_m: float | None = None
+    ) -> garment_pb2.BuildGarmentResponse:
+        built: garment_pb2.BuildGarmentResponse = await self.call(
+            calls.garment_request(pattern, edge_m)
+        )
+        return built
 
     async def run_test(
         self,

@@ -13,9 +13,10 @@ import grpc
 
 from .errors import Error, InvalidArgument, Refusal, Violation, error
 from .frame import Frame, Parts, Reader
-from .scene import Action, BendingLaw, LabDirection, LabMesh, LabTest, MeshData, Textile
+from .scene import Action, BendingLaw, LabDirection, LabMesh, LabTest, MeshData, Pattern, Textile
 from .scene import action_proto
-from .v1 import asset_pb2, asset_pb2_grpc, frame_pb2, frame_pb2_grpc, lab_pb2, lab_pb2_grpc
+from .v1 import asset_pb2, asset_pb2_grpc, frame_pb2, frame_pb2_grpc, garment_pb2
+from .v1 import garment_pb2_grpc, lab_pb2, lab_pb2_grpc
 from .v1 import mesh_pb2, server_pb2, server_pb2_grpc, session_pb2, session_pb2_grpc
 from .v1 import textile_pb2, textile_pb2_grpc
 from .values import enum_number
@@ -32,6 +33,7 @@ SERVICES: list[tuple[Any, Any]] = [
     (textile_pb2, textile_pb2_grpc),
     (lab_pb2, lab_pb2_grpc),
     (asset_pb2, asset_pb2_grpc),
+    (garment_pb2, garment_pb2_grpc),
     (server_pb2, server_pb2_grpc),
 ]
 
@@ -73,7 +75,7 @@ class Attempts:
     is one that another server of several is to answer.
     """
 
-    _harmless = re.compile("Get|List|StreamFrames|ViewFrames|UploadAsset|DownloadAsset")
+    _harmless = re.compile("Get|List|StreamFrames|ViewFrames|UploadAsset|DownloadAsset|BuildGarment")
 
     def __init__(self, link: Link, request: Any, patience: float = PATIENCE):
         self._link = link
@@ -345,6 +347,10 @@ def test_request(
     if bending:
         request.bending.CopyFrom(bending.to_proto("bending"))
     return request
+
+
+def garment_request(pattern: Pattern, edge_m: float | None) -> garment_pb2.BuildGarmentRequest:
+    return garment_pb2.BuildGarmentRequest(pattern=pattern.to_proto("pattern"), edge_m=edge_m)
 
 
 def mesh_of(name: str, data: bytes) -> MeshData:

@@ -22,6 +22,7 @@ from .scene import (
     LabTest,
     MeshData,
     MoveCollider,
+    Pattern,
     PinParticle,
     Release,
     Scene,
@@ -31,7 +32,8 @@ from .scene import (
     Vector3,
     action_proto,
 )
-from .v1 import asset_pb2, frame_pb2, lab_pb2, server_pb2, session_pb2, textile_pb2
+from .v1 import asset_pb2, frame_pb2, garment_pb2, lab_pb2, server_pb2, session_pb2
+from .v1 import textile_pb2
 
 
 def connect(
@@ -180,6 +182,16 @@ class Server:
         request = textile_pb2.GetTextileRequest(name=calls.textile_name(name))
         preset: textile_pb2.TextilePreset = self.call(request)
         return preset
+
+    def build_garment(
+        self, pattern: Pattern, edge_m: float | None = None
+    ) -> garment_pb2.BuildGarmentResponse:
+        """A pattern cut into triangles and sewn: `Sheet.from_proto(answer.sheet)` lacks its textile
+        alone. edge_m is the wanted length of triangles' edges, m; None: 0.01."""
+        built: garment_pb2.BuildGarmentResponse = self.call(
+            calls.garment_request(pattern, edge_m)
+        )
+        return built
 
     def run_test(
         self,

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from google.protobuf import json_format
 
 from .errors import error
-from .v1 import action_pb2, mesh_pb2, scene_pb2, textile_pb2
+from .v1 import action_pb2, garment_pb2, mesh_pb2, scene_pb2, textile_pb2
 from .values import Value, planes, row_bytes
 
 Vector3 = Sequence[float]  # x, y, z
@@ -441,6 +441,87 @@ class Scene(Value):
     def load(cls, path: str | os.PathLike[str]) -> "Scene":
         """Reads a scene file."""
         return cls.from_json(pathlib.Path(path).read_text())
+
+
+@dataclass(eq=False)
+class PatternEdge(Value):
+    """A line of an outline, from where the one before ends.
+
+    points_m  (n, 2) control points and the end, m: one straight, two or three a Bezier curve
+    arc       of two points: the arc of a circle through the first
+    """
+
+    message = garment_pb2.PatternEdge
+    points_m: npt.ArrayLike
+    arc: bool = False
+    label: str = ""
+
+    @classmethod
+    def from_proto(cls, message: Any) -> "PatternEdge":
+        edge = super().from_proto(message)
+        edge.points_m = np.array(edge.points_m, float).reshape(-1, 2)
+        return edge
+
+
+@dataclass(eq=False)
+class PatternPanel(Value):
+    """A piece as it is cut: its outline, anticlockwise."""
+
+    message = garment_pb2.PatternPanel
+    name: str
+    edges: Sequence[PatternEdge]
+    grain_rad: float = 0
+    placement: Placement | None = None
+    textile: Textile | None = None
+
+
+@dataclass(eq=False)
+class EdgeRun(Value):
+    """Part of an edge, by shares of its length."""
+
+    message = garment_pb2.EdgeRun
+    panel: str
+    edge: int
+    begin: float | None = None
+    end: float | None = None
+
+
+@dataclass(eq=False)
+class PatternSeam(Value):
+    """Two lines that become one."""
+
+    message = garment_pb2.PatternSeam
+    first_side: Sequence[EdgeRun]
+    second_side: Sequence[EdgeRun]
+    same_direction: bool = False
+
+
+@dataclass(eq=False)
+class Pattern(Value):
+    """A garment as it is cut: pieces, and what is sewn to what.
+
+    >>> square = [PatternEdge([corner]) for corner in ((1, 0), (1, 1), (0, 1), (0, 0))]
+    >>> tube = Pattern([PatternPanel("tube", square)],
+    ...                [PatternSeam([EdgeRun("tube", 1)], [EdgeRun("tube", 3)])])
+    >>> Pattern.from_json(tube.to_json()) == tube
+    True
+    """
+
+    message = garment_pb2.Pattern
+    panels: Sequence[PatternPanel]
+    seams: Sequence[PatternSeam] = ()
+
+    def to_json(self) -> str:
+        """What stands in a pattern file."""
+        return json_format.MessageToJson(self.to_proto(), preserving_proto_field_name=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> "Pattern":
+        """The pattern of a pattern file's text."""
+        try:
+            return cls.from_proto(json_format.Parse(text, garment_pb2.Pattern()))
+        except json_format.ParseError as wrong:
+            raise error("INVALID_ARGUMENT", "FILE_MALFORMED", str(wrong)) from None
 
 
 @dataclass(eq=False)

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "google/rpc/status.pb.h"
+#include "weft/v1/garment.pb.h"
 #include "weft/v1/lab.pb.h"
 #include "weft/v1/textile.pb.h"
 
@@ -257,7 +258,8 @@ std::vector<const google::protobuf::MethodDescriptor*> all_methods() {
   for (const auto* file :
        {v1::Asset::descriptor()->file(), v1::StreamFramesRequest::descriptor()->file(),
         v1::RunTestRequest::descriptor()->file(), v1::ServerInfo::descriptor()->file(),
-        v1::Session::descriptor()->file(), v1::Textile::descriptor()->file()}) {
+        v1::Session::descriptor()->file(), v1::Textile::descriptor()->file(),
+        v1::Pattern::descriptor()->file()}) {
     for (int i = 0; i < file->service_count(); ++i) {
       for (int k = 0; k < file->service(i)->method_count(); ++k)
         methods.push_back(file->service(i)->method(k));

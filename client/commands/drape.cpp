@@ -1,0 +1,252 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include "client/commands/commands.h"
+#include "client/exports/export.h"
+#include "client/garments/garment_scene.h"
+#include "client/garments/garment_templates.h"
+#include "client/garments/pattern_file.h"
+#include "client/output/status.h"
+#include "client/output/text.h"
+#include "client/page/page.h"
+#include "client/recording/recorder.h"
+#include "client/scene_file.h"
+#include "client/textile_file.h"
+
+namespace weft::client {
+namespace {
+
+struct DrapeOptions {
+  std::string garment;
+  Person person;
+  std::vector<std::string> bodies;
+  std::string textile = "jersey_interlock";
+  std::optional<double> edge_m;
+  std::optional<v1::Accuracy> accuracy;
+  double seconds = 20;
+  std::string output, page, recording;
+  bool replace = false;
+};
+
+// A recording, in a file that is wanted or goes with this.
+class Recorded {
+ public:
+  explicit Recorded(std::string wanted) : path_(std::move(wanted)), kept_(!path_.empty()) {
+    if (kept_) return;
+    std::string name = (std::filesystem::temp_directory_path() / "weft-drape-XXXXXX").string();
+    const int file = mkstemp(name.data());
+    if (file < 0) throw unwritable(name, "no temporary file can be made");
+    close(file);
+    path_ = name;
+  }
+  ~Recorded() {
+    std::error_code ignored;
+    if (!kept_) std::filesystem::remove(path_, ignored);
+  }
+  Recorded(const Recorded&) = delete;
+  Recorded& operator=(const Recorded&) = delete;
+  const std::string& path() const { return path_; }
+  bool kept() const { return kept_; }
+
+ private:
+  std::string path_;
+  bool kept_;
+};
+
+std::optional<ExportFormat> format_of(const std::string& path) {
+  static const std::map<std::string, ExportFormat> formats{
+      {".glb", ExportFormat::kGltf}, {".usda", ExportFormat::kUsda}, {".npz", ExportFormat::kNpz}};
+  const auto found = formats.find(std::filesystem::path(path).extension().string());
+  return found == formats.end() ? std::nullopt : std::optional(found->second);
+}
+
+void check(const DrapeOptions& options) {
+  if (!options.output.empty() && !format_of(options.output))
+    throw usage_problem(
+        fmt::format("--output {}: ends in none of .glb, .usda and .npz", options.output));
+  for (const std::string& path : {options.output, options.page, options.recording})
+    if (!path.empty() && !options.replace && std::filesystem::exists(path))
+      throw unwritable(path, "the file exists; --force replaces it");
+}
+
+bool is_template(const std::string& name) {
+  const std::vector<GarmentInfo> all = garment_templates();
+  return std::ranges::any_of(all, [&](const GarmentInfo& each) { return each.name == name; });
+}
+
+// What goes on at a time.
+const char* phase_at(const v1::Dressing& dressing, double time_s) {
+  if (time_s < dressing.close_s()) return "seams close";
+  if (time_s < dressing.close_s() + dressing.settle_s()) return "weight comes in";
+  for (const v1::Hold& hold : dressing.holds())
+    if (time_s < dressing.close_s() + hold.until_s()) return "held up";
+  return "comes to rest";
+}
+
+RecordingResult dress(Context& context, const v1::Session& session, const DrapeOptions& options,
+                      const std::string& path) {
+  const v1::Scene& scene = session.scene();
+  RecordingOrder order;
+  order.session = session.name();
+  order.path = path;
+  order.replace = order.run = true;
+  order.from = 0;
+  order.until_rest = true;
+  order.to = static_cast<std::int64_t>(std::ceil(options.seconds / scene.solver().frame_step_s()));
+  Status status(context.terminal.err, context.terminal.err_is_watched);
+  RecordingResult result = record(context.connection(), order, [&](const Tally& tally) {
+    status.show({fmt::format(
+        "{:<16} {:.2f} s  {}", phase_at(scene.dressing(), tally.last_time_s), tally.last_time_s,
+        tally.last_stats.cloth_cut_count() > 0 ? count_of(tally.last_stats.cloth_cut_count(), "cut")
+                                               : "")});
+  });
+  status.clear();
+  return result;
+}
+
+std::string verdict_text(const v1::Verdict& verdict, const Tally& tally) {
+  Facts facts;
+  facts.add("verdict", verdict.good() ? "good" : "not good");
+  for (const v1::Fault& fault : verdict.faults())
+    facts.add("fault", fmt::format("{}: {}", fault.code(), fault.message()));
+  facts.add("rest", verdict.at_rest() ? fmt::format("after {:.2f} s", tally.last_time_s)
+                                      : fmt::format("not within {:.2f} s", tally.last_time_s));
+  facts.add("cuts", fmt::format("{} at the end, {} in the worst frame", verdict.cloth_cut_count(),
+                                tally.most_cuts.value_or(0)));
+  facts.add("body", verdict.particles_inside() == 0
+                        ? "nothing inside"
+                        : fmt::format("{} inside, up to {:.2g} mm",
+                                      count_of(verdict.particles_inside(), "particle"),
+                                      1000 * verdict.deepest_m()));
+  facts.add("strain",
+            fmt::format("99 % of it below {} along the warp, {} along the weft",
+                        percent_text(verdict.strain_warp()), percent_text(verdict.strain_weft())));
+  facts.add("pressure", fmt::format("up to {:.3g} kPa", verdict.largest_pressure_pa() / 1000));
+  if (verdict.slid_m() != 0)
+    facts.add("slid", fmt::format("{:.0f} mm down", 1000 * verdict.slid_m()));
+  facts.add("cost", fmt::format("{}, {}", count_of(verdict.substep_count(), "substep"),
+                                seconds_text(verdict.computing_s())));
+  return facts.text();
+}
+
+void run_drape(Context& context, const DrapeOptions& options) {
+  check(options);
+  context.prefer_embedded();
+  GarmentOrder order;
+  order.textile = textile_named(options.textile);
+  order.edge_m = options.edge_m;
+  const bool own = is_template(options.garment);
+  order.name = own ? options.garment
+                   : plain_name(std::filesystem::path(options.garment).stem().string(), "garment");
+  std::vector<std::string> notes;
+  std::optional<DressForm> form;
+  if (own || options.bodies.empty()) form = make_dress_form(measures_of(options.person));
+  if (own) {
+    order.pattern = make_garment(options.garment, *form);
+  } else {
+    ImportedPattern read = read_pattern(options.garment);
+    order.pattern = std::move(read.pattern);
+    notes = std::move(read.notes);
+  }
+  for (const std::string& path : options.bodies) order.bodies.push_back(garment_body(path));
+  if (options.bodies.empty()) order.bodies.push_back(garment_body(*form));
+
+  GarmentScene made = make_garment_scene(context.connection(), order);
+  if (options.accuracy) made.scene.mutable_solver()->set_accuracy(*options.accuracy);
+  const v1::Session session = create_session(context.connection(), made.scene);
+  const Recorded recorded(options.recording);
+  const RecordingResult result = dress(context, session, options, recorded.path());
+  if (context.stop.stop_requested()) throw interrupted();
+
+  v1::GetVerdictRequest ask;
+  ask.set_name(session.name());
+  const v1::Verdict verdict = context.connection().call(&Sessions::GetVerdict, ask);
+  std::string text;
+  for (const std::string& note : notes) text += note + '\n';
+  text += made.text + verdict_text(verdict, result.tally);
+  Json document{{"garment", made.json}, {"verdict", to_json(verdict)}};
+  document["session"] = session.name();
+  if (!options.output.empty()) {
+    RecordingReader recording(recorded.path());
+    ExportOrder write;
+    write.format = *format_of(options.output);
+    write.path = options.output;
+    write.frames.first = write.frames.last = result.tally.last_frame;
+    export_recording(recording, write, [](const ExportResult&) {});
+    document["output"] = options.output;
+    text += "wrote " + options.output + '\n';
+  }
+  if (!options.page.empty()) {
+    PageOrder page{.path = options.page, .title = order.name};
+    page.figures.push_back(
+        {.title = "", .caption = "", .exhibits = {{order.name, recorded.path()}}});
+    write_page(page, [](const std::string&) {});
+    document["page"] = options.page;
+    text += "wrote " + options.page + '\n';
+  }
+  if (recorded.kept()) text += "wrote " + recorded.path() + '\n';
+  context.answer(document, text);
+  if (verdict.good()) return;
+  std::string why;
+  for (const v1::Fault& fault : verdict.faults())
+    why += (why.empty() ? "" : "; ") + fault.code() + ": " + fault.message();
+  throw Problem(Exit::kRefused, "FAILED_PRECONDITION", "DRAPE_NOT_GOOD",
+                "not a good drape: " + why);
+}
+
+}  // namespace
+
+void add_drape(CLI::App& app, Context& context) {
+  auto options = std::make_shared<DrapeOptions>();
+  CLI::App* command =
+      app.add_subcommand("drape", "Dress a body in a garment, and judge how it sits");
+  command
+      ->add_option("GARMENT", options->garment,
+                   "Garment (weft garment new --help lists them), or a pattern file")
+      ->option_text(" ")
+      ->required();
+  add_person(*command, options->person);
+  command
+      ->add_option("--body", options->bodies,
+                   "Closed triangles that wear it instead of the dress form: .obj, .gltf or .glb; "
+                   "may be given again")
+      ->type_name("FILE")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--textile", options->textile,
+                   "Preset (weft textile list), or a file (weft textile new)")
+      ->option_text("NAME|FILE.json")
+      ->capture_default_str();
+  command->add_option("--edge", options->edge_m, "Wanted length of triangles' edges, m; else 0.01")
+      ->type_name("M");
+  const std::map<std::string, v1::Accuracy> accuracies{{"draft", v1::ACCURACY_DRAFT},
+                                                       {"standard", v1::ACCURACY_STANDARD},
+                                                       {"fine", v1::ACCURACY_FINE}};
+  command->add_option("--accuracy", options->accuracy, "How close to the equations, and how fast")
+      ->transform(one_of(accuracies))
+      ->option_text("draft|standard|fine");
+  command->add_option("--seconds", options->seconds, "Most simulated time until it is at rest, s")
+      ->type_name("S")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  command
+      ->add_option("-o,--output", options->output, "Dressed garment to write: .glb, .usda or .npz")
+      ->type_name("FILE");
+  command->add_option("--page", options->page, "Page that plays it to write")->type_name("FILE");
+  command->add_option("--recording", options->recording, "Recording to write")->type_name("FILE");
+  command->add_flag("--force", options->replace, "Replace files that exist");
+  command->footer(R"(
+Panels start where the pattern places them. Seams close, without weight, then
+weight comes in; edges with the label "waist" are held up meanwhile. It ends at
+rest with a verdict, and exit code 1 where that is not good.
+  weft drape tshirt --size 40 -o tshirt.glb --page tshirt.html
+  weft drape pattern.json --body body.obj --textile denim_11oz -o out.glb
+)");
+  command->callback([&context, options] { run_drape(context, *options); });
+}
+
+}  // namespace weft::client

@@ -1,0 +1,363 @@
+#include "client/garments/garment_templates.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+
+#include "client/garments/draft.h"
+
+namespace weft::client {
+namespace {
+
+constexpr double kClear = 0.02;  // between the body and a panel beside it, m
+constexpr const char* kSides[] = {"left", "right"};
+
+// Where the body is, as far as panels have to know.
+class Surroundings {
+ public:
+  explicit Surroundings(const DressForm& form) : form_(form) {}
+
+  // Foremost, or with -1 hindmost point of what lies within `wide` of the middle between two
+  // heights, m.
+  double depth(double direction, double low, double high, double wide) const {
+    double most = 0;
+    for (const Vector3d& at : form_.mesh.vertices)
+      if (at.y() >= low && at.y() <= high && std::abs(at.x()) <= wide)
+        most = std::max(most, direction * at.z());
+    return direction * most;
+  }
+  // Highest point of the body near x, below the chin, m.
+  double top(double x) const {
+    constexpr double kNear = 0.015;
+    double most = 0;
+    for (const Vector3d& at : form_.mesh.vertices)
+      if (std::abs(at.x() - x) < kNear && at.y() < form_.neck_height + 0.04)
+        most = std::max(most, at.y());
+    return most;
+  }
+
+ private:
+  const DressForm& form_;
+};
+
+PanelPlace front_of(const Outline& outline, const Surroundings& body) {
+  return {{0, 0, body.depth(1, outline.least_v(), outline.most_v(), outline.most_u()) + kClear}};
+}
+PanelPlace back_of(const Outline& outline, const Surroundings& body) {
+  const double z = body.depth(-1, outline.least_v(), outline.most_v(), outline.most_u()) - kClear;
+  return behind({}, z);
+}
+
+std::string of_side(const char* label, const std::string& side) { return label + ("-" + side); }
+
+// A top's body, half of it drawn, down to a hem: heights, and half widths.
+struct Bodice {
+  double hem, hem_half;
+  double underarm, chest_half;
+  double shoulder, shoulder_half;
+  double neck, neck_half;
+  double front_neck, back_neck;  // depths of the neckline
+};
+
+// Labels end in the wearer's side; the back is drawn as seen from behind.
+Outline bodice_outline(const Bodice& b, bool front) {
+  const std::string here = front ? "left" : "right", there = front ? "right" : "left";
+  const double depth = b.shoulder - b.underarm, drop = front ? b.front_neck : b.back_neck;
+  Outline outline({-b.hem_half, b.hem});
+  outline.line("hem", {b.hem_half, b.hem});
+  const auto side = of_side("side", here), armhole = of_side("armhole", here),
+             shoulder = of_side("shoulder", here), other_shoulder = of_side("shoulder", there),
+             other_armhole = of_side("armhole", there), other_side = of_side("side", there);
+  const Vector2d underarm(b.chest_half, b.underarm), tip(b.shoulder_half, b.shoulder),
+      neck(b.neck_half, b.neck);
+  constexpr double kHollow = 0.02;
+  const Vector2d low(b.shoulder_half - kHollow, b.underarm + 0.02 * depth),
+      high(b.shoulder_half - kHollow, b.shoulder - 0.55 * depth);
+  const auto image = [](const Vector2d& point) { return Vector2d(-point.x(), point.y()); };
+  outline.line(side.c_str(), underarm);
+  outline.curve(armhole.c_str(), {low, high, tip});
+  outline.line(shoulder.c_str(), neck);
+  outline.curve("neck", {Vector2d(b.neck_half, b.neck - 0.95 * drop),
+                         Vector2d(-b.neck_half, b.neck - 0.95 * drop), image(neck)});
+  outline.line(other_shoulder.c_str(), image(tip));
+  outline.curve(other_armhole.c_str(), {image(high), image(low), image(underarm)});
+  outline.line(other_side.c_str(), {-b.hem_half, b.hem});
+  return outline;
+}
+
+// The front half of the left sleeve, v up the arm, u = 0 in its middle; the cap is as long as the
+// armhole, and eased by 1.5 %.
+Outline sleeve_outline(double half_width, double hem_half_width, double length, double armhole) {
+  constexpr double kEase = 1.015;
+  const double u = half_width / 2, hem = hem_half_width / 2;
+  const auto with_cap = [&](double height) {
+    Outline outline({-hem, 0});
+    outline.line("cuff", {hem, 0});
+    outline.line("over", {u, length + height});
+    outline.curve("cap", {Vector2d(u - 0.45 * half_width, length + height),
+                          Vector2d(-u + 0.35 * half_width, length), Vector2d(-u, length)});
+    outline.line("under", {-hem, 0});
+    return outline;
+  };
+  double low = 0, high = 2 * armhole;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2;
+    (with_cap(middle).length("cap") < kEase * armhole ? low : high) = middle;
+  }
+  return with_cap(low);
+}
+
+// Sleeves of two halves around both arms, sewn into the armholes of front and back.
+void add_sleeves(Draft& draft, const DressForm& form, const Bodice& bodice, double half_width,
+                 double cuff_half_width, double length) {
+  const Outline sleeve = sleeve_outline(half_width, cuff_half_width, length,
+                                        bodice_outline(bodice, true).length("armhole-left"));
+  // v runs up the arm; the cap ends at the shoulder's tip, or the underarm beside the bodice's
+  const auto& arm = form.arm;
+  const double turn = std::numbers::pi / 2 + std::atan2(arm.direction.y(), arm.direction.x());
+  const double tip = arm.radius / 2 + sleeve.most_v() - length,
+               aside =
+                   (bodice.chest_half + kClear - arm.top.x() + half_width / 2 * std::cos(turn)) /
+                   arm.direction.x();
+  const Vector3d cuff = arm.top + (std::max(tip, aside) + length) * arm.direction;
+  const double deep = arm.radius + kClear, mid = (arm.top.z() + cuff.z()) / 2,
+               lean = std::abs(arm.top.z() - cuff.z()) / 2;
+  PanelPlace place{{cuff.x(), cuff.y(), mid + lean + deep},
+                   Quaterniond(Eigen::AngleAxisd(turn, Vector3d::UnitZ()))};
+  const PanelPlace back = behind(place, mid - lean - deep);
+  draft.add("sleeve-front-left", sleeve, place);
+  draft.add("sleeve-back-left", sleeve.mirrored(), back);
+  draft.add("sleeve-front-right", sleeve.mirrored(), mirrored(place));
+  draft.add("sleeve-back-right", sleeve, mirrored(back));
+  for (const std::string side : kSides) {
+    const std::string sleeve_front = "sleeve-front-" + side, sleeve_back = "sleeve-back-" + side;
+    draft.sew({"front", {of_side("armhole", side)}}, {sleeve_front, {"cap"}});
+    draft.sew({"back", {of_side("armhole", side)}}, {sleeve_back, {"cap"}});
+    draft.sew({sleeve_front, {"over"}}, {sleeve_back, {"over"}});
+    draft.sew({sleeve_front, {"under"}}, {sleeve_back, {"under"}});
+  }
+}
+
+// Shoulders, necks and armholes of a top, with `ease` around the chest, m.
+Bodice bodice_for(const DressForm& form, const Surroundings& body, double ease) {
+  Bodice b{};
+  b.chest_half = (form.girth("bust").wanted + ease) / 4;
+  b.neck_half = form.neck_girth / (2 * std::numbers::pi) + 0.025;
+  b.shoulder_half = form.arm.top.x() + 0.015;
+  // above the body all along
+  b.neck = body.top(b.neck_half) + 0.015;
+  b.shoulder = body.top(b.shoulder_half) + 0.015;
+  for (double t = 0.1; t < 1; t += 0.1) {
+    const double line = b.neck + t * (b.shoulder - b.neck);
+    const double lack = body.top(b.neck_half + t * (b.shoulder_half - b.neck_half)) + 0.012 - line;
+    if (lack > 0) b.neck += lack, b.shoulder += lack;
+  }
+  // below the arm
+  const double along = (b.chest_half - form.arm.top.x()) / form.arm.direction.x();
+  const double arm =
+      form.arm.top.y() + along * form.arm.direction.y() - form.arm.radius / form.arm.direction.x();
+  b.underarm = std::min(b.shoulder - form.girth("bust").wanted / 10 - 0.11, arm - kClear);
+  b.front_neck = 0.09;
+  b.back_neck = 0.025;
+  return b;
+}
+
+void add_bodice(Draft& draft, const Bodice& b, const Surroundings& body) {
+  const Outline front = bodice_outline(b, true), back = bodice_outline(b, false);
+  draft.add("front", front, front_of(front, body));
+  draft.add("back", back, back_of(back, body));
+  for (const std::string side : kSides)
+    for (const char* label : {"side", "shoulder"})
+      draft.sew({"front", {of_side(label, side)}}, {"back", {of_side(label, side)}});
+}
+
+double upper_arm_half(const DressForm& form, double ease) {
+  return std::numbers::pi * form.arm.radius + ease / 2;
+}
+
+v1::Pattern tshirt(const DressForm& form) {
+  const Surroundings body(form);
+  Draft draft;
+  Bodice b = bodice_for(form, body, 0.08);
+  b.hem = form.girth("hip").height + 0.02;
+  b.hem_half = std::max(b.chest_half, (form.girth("hip").wanted + 0.04) / 4);
+  add_bodice(draft, b, body);
+  const double half = upper_arm_half(form, 0.09);
+  add_sleeves(draft, form, b, half, 0.92 * half, 0.07);
+  return draft.take();
+}
+
+// A piece of a skirt from the waist, with two darts of that width and depth.
+struct SkirtPiece {
+  double waist, waist_half, hip, hip_half, hem, hem_half;
+  double dart_width, dart_depth;
+};
+
+Outline skirt_outline(const SkirtPiece& s, bool front) {
+  const std::string here = front ? "left" : "right", there = front ? "right" : "left";
+  const auto side = of_side("side", here), other = of_side("side", there);
+  const double half = s.waist_half + s.dart_width, dart = s.waist_half / 2 + s.dart_width / 2;
+  const double fall = s.waist - s.hip;
+  const Vector2d hip_high(s.hip_half, s.hip + 0.45 * fall),
+      waist_low(half + 0.006, s.waist - 0.3 * fall);
+  Outline outline({-s.hem_half, s.hem});
+  outline.line("hem", {s.hem_half, s.hem});
+  outline.line(("low-" + side).c_str(), {s.hip_half, s.hip});
+  outline.curve(side.c_str(), {hip_high, waist_low, Vector2d(half, s.waist)});
+  outline.line("waist-1", {dart + s.dart_width / 2, s.waist});
+  outline.line("dart-1", {dart, s.waist - s.dart_depth});
+  outline.line("dart-2", {dart - s.dart_width / 2, s.waist});
+  outline.line("waist-2", {-dart + s.dart_width / 2, s.waist});
+  outline.line("dart-3", {-dart, s.waist - s.dart_depth});
+  outline.line("dart-4", {-dart - s.dart_width / 2, s.waist});
+  outline.line("waist-3", {-half, s.waist});
+  outline.curve(other.c_str(),
+                {Vector2d(-waist_low.x(), waist_low.y()), Vector2d(-hip_high.x(), hip_high.y()),
+                 Vector2d(-s.hip_half, s.hip)});
+  outline.line(("low-" + other).c_str(), {-s.hem_half, s.hem});
+  return outline;
+}
+
+Outline band_outline(double half, double low, double height, bool front) {
+  const std::string here = front ? "left" : "right", there = front ? "right" : "left";
+  Outline outline({-half, low});
+  outline.line("lower", {half, low});
+  outline.line(of_side("side", here).c_str(), {half, low + height});
+  outline.line("upper", {-half, low + height});
+  outline.line(of_side("side", there).c_str(), {-half, low});
+  return outline;
+}
+
+v1::Pattern skirt(const DressForm& form) {
+  constexpr double kBand = 0.035;
+  const Surroundings body(form);
+  Draft draft;
+  SkirtPiece piece{};
+  piece.waist = form.girth("waist").height - kBand / 2;
+  piece.waist_half = (form.girth("waist").wanted + 0.015) / 4;
+  piece.hip = form.girth("hip").height;
+  piece.hip_half = (form.girth("hip").wanted + 0.04) / 4;
+  piece.hem = 0.28 * form.stature;
+  piece.hem_half = piece.hip_half + 0.07;
+  for (const bool front : {true, false}) {
+    const std::string name = front ? "front" : "back";
+    piece.dart_width = front ? 0.012 : 0.022;
+    piece.dart_depth = front ? 0.09 : 0.13;
+    const Outline outline = skirt_outline(piece, front);
+    const Outline band = band_outline(piece.waist_half, piece.waist + 0.01, kBand, front);
+    const auto place = front ? front_of : back_of;
+    draft.add(name, outline, place(outline, body));
+    draft.add("band-" + name, band, place(band, body), std::numbers::pi / 2);
+    draft.sew({name, {"dart-1"}}, {name, {"dart-2"}});
+    draft.sew({name, {"dart-3"}}, {name, {"dart-4"}});
+    draft.sew({name, {"waist-1", "waist-2", "waist-3"}}, {"band-" + name, {"lower"}});
+  }
+  for (const std::string side : kSides) {
+    const std::string label = of_side("side", side);
+    draft.sew({"front", {label}}, {"back", {label}});
+    draft.sew({"front", {"low-" + label}}, {"back", {"low-" + label}});
+    draft.sew({"band-front", {label}}, {"band-back", {label}});
+  }
+  return draft.take();
+}
+
+// A trapezoid on the body's middle, its upper edge gathered into something.
+Outline flared_outline(const char* upper, double high, double high_half, double low,
+                       double low_half, bool front) {
+  const std::string here = front ? "left" : "right", there = front ? "right" : "left";
+  Outline outline({-low_half, low});
+  outline.line("hem", {low_half, low});
+  outline.line(of_side("side", here).c_str(), {high_half, high});
+  outline.line(upper, {-high_half, high});
+  outline.line(of_side("side", there).c_str(), {-low_half, low});
+  return outline;
+}
+
+v1::Pattern dress(const DressForm& form) {
+  constexpr double kGathers = 1.35;
+  const Surroundings body(form);
+  Draft draft;
+  Bodice b = bodice_for(form, body, 0.06);
+  b.hem = form.girth("waist").height;
+  b.hem_half = (form.girth("waist").wanted + 0.06) / 4;
+  b.front_neck = 0.11;
+  add_bodice(draft, b, body);
+  const double half = upper_arm_half(form, 0.08);
+  add_sleeves(draft, form, b, half, 0.92 * half, 0.05);
+  const double waist_half = kGathers * b.hem_half, hem = 0.27 * form.stature;
+  const double hem_half =
+      std::max(waist_half, (form.girth("hip").wanted + 0.1) / 4) + 0.25 * (b.hem - hem);
+  for (const bool front : {true, false}) {
+    const std::string name = front ? "front" : "back";
+    const Outline outline =
+        flared_outline("waist", b.hem - 0.015, waist_half, hem, hem_half, front);
+    draft.add("skirt-" + name, outline, (front ? front_of : back_of)(outline, body));
+    draft.sew({name, {"hem"}}, {"skirt-" + name, {"waist"}});
+  }
+  for (const std::string side : kSides)
+    draft.sew({"skirt-front", {of_side("side", side)}}, {"skirt-back", {of_side("side", side)}});
+  return draft.take();
+}
+
+v1::Pattern shirt(const DressForm& form) {
+  constexpr double kCollar = 0.04;
+  const Surroundings body(form);
+  Draft draft;
+  Bodice b = bodice_for(form, body, 0.12);
+  b.hem = form.girth("hip").height - 0.03;
+  b.hem_half = std::max(b.chest_half, (form.girth("hip").wanted + 0.06) / 4);
+  b.neck_half -= 0.01;
+  b.front_neck = 0.075;
+  add_bodice(draft, b, body);
+  const double half = upper_arm_half(form, 0.12);
+  add_sleeves(draft, form, b, half, 0.62 * half, form.arm.length - 0.22);
+  for (const bool front : {true, false}) {
+    const std::string name = front ? "front" : "back";
+    const double neck = bodice_outline(b, front).length("neck");
+    const Outline collar = band_outline(neck / 2, b.neck + 0.01, kCollar, front);
+    draft.add("collar-" + name, collar, (front ? front_of : back_of)(collar, body),
+              std::numbers::pi / 2);
+    draft.sew({name, {"neck"}}, {"collar-" + name, {"lower"}});
+  }
+  for (const std::string side : kSides)
+    draft.sew({"collar-front", {of_side("side", side)}}, {"collar-back", {of_side("side", side)}});
+  return draft.take();
+}
+
+struct Template {
+  GarmentInfo info;
+  v1::Pattern (*make)(const DressForm&);
+};
+const std::vector<Template>& all_templates() {
+  static const std::vector<Template> all = {
+      {{"tshirt", "A T-shirt: front, back, sleeves of two halves"}, tshirt},
+      {{"skirt", "A skirt to the knee: front and back with darts, a waistband"}, skirt},
+      {{"dress", "A dress to the knee: a fitted top with sleeves, a gathered skirt"}, dress},
+      {{"shirt", "A loose shirt with long sleeves and a stand-up collar, without an opening"},
+       shirt},
+  };
+  return all;
+}
+
+}  // namespace
+
+std::vector<GarmentInfo> garment_templates() {
+  std::vector<GarmentInfo> infos;
+  for (const Template& each : all_templates()) infos.push_back(each.info);
+  return infos;
+}
+
+v1::Pattern make_garment(const std::string& name, const DressForm& form) {
+  std::string names;
+  for (const Template& each : all_templates()) {
+    if (each.info.name == name) return each.make(form);
+    names += (names.empty() ? "" : ", ") + each.info.name;
+  }
+  throw usage_problem(fmt::format("there is no garment \"{}\"; there are {}", name, names));
+}
+
+}  // namespace weft::client

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "client/figures/dress_form.h"
+#include "weft/v1/garment.pb.h"
+
+namespace weft::client {
+
+struct GarmentInfo {
+  std::string name;
+  std::string description;
+};
+std::vector<GarmentInfo> garment_templates();
+
+// A pattern for who has the form's measures, placed around it so that nothing starts inside.
+// Throws a Problem: no such template.
+v1::Pattern make_garment(const std::string& name, const DressForm& form);
+
+}  // namespace weft::client

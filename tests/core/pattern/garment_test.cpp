@@ -1,0 +1,476 @@
+#include "core/pattern/garment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <random>
+#include <set>
+
+#include "core/model/mesh_problems.h"
+#include "core/pattern/panel_mesher.h"
+
+namespace weft::testing {
+namespace {
+
+using std::numbers::pi;
+
+PatternEdge line_to(double u, double v) { return {.points = {{u, v}}}; }
+PatternEdge arc_to(Vector2d through, Vector2d end) {
+  return {.points = {through, end}, .arc = true};
+}
+
+PatternPanel panel(std::string name, std::vector<PatternEdge> edges) {
+  PatternPanel panel;
+  panel.name = std::move(name);
+  panel.edges = std::move(edges);
+  return panel;
+}
+
+PatternPanel rectangle(const std::string& name, double width, double height) {
+  return panel(name,
+               {line_to(width, 0), line_to(width, height), line_to(0, height), line_to(0, 0)});
+}
+
+// Half of a disc about the origin on the side of +u, its straight edge last.
+PatternPanel half_disc(const std::string& name, double radius) {
+  return panel(name, {arc_to({radius, 0}, {0, radius}), line_to(0, -radius)});
+}
+
+PatternPanel turned(PatternPanel panel, double angle) {
+  panel.rotation = Eigen::AngleAxisd(angle, Vector3d::UnitZ());
+  return panel;
+}
+
+PatternSeam seam(EdgeRun first, EdgeRun second) {
+  return {{std::move(first)}, {std::move(second)}};
+}
+
+Garment built(const Pattern& pattern, double edge) {
+  auto result = build_garment(pattern, edge, "pattern", "edge_m");
+  if (const auto* problems = std::get_if<std::vector<Problem>>(&result)) {
+    ADD_FAILURE() << (*problems)[0].field << ": " << (*problems)[0].message;
+    return {};
+  }
+  Garment garment = std::get<Garment>(std::move(result));
+  // what is built can be simulated
+  const auto problems = find_problems(*complete(garment.mesh), "mesh");
+  for (const Problem& each : problems) ADD_FAILURE() << each.field << ": " << each.message;
+  return garment;
+}
+
+std::vector<Problem> refused(const Pattern& pattern, double edge = 0.02) {
+  auto result = build_garment(pattern, edge, "pattern", "edge_m");
+  if (auto* problems = std::get_if<std::vector<Problem>>(&result)) return std::move(*problems);
+  ADD_FAILURE() << "was built";
+  return {{"", ""}};
+}
+
+double flat_area(const TriangleMesh& mesh) {
+  double area = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Vector2d a = flat_corner(mesh, t, 1) - flat_corner(mesh, t, 0),
+                   b = flat_corner(mesh, t, 2) - flat_corner(mesh, t, 0);
+    area += (a.x() * b.y() - a.y() * b.x()) / 2;
+  }
+  return area;
+}
+
+// Edges with their numbers of triangles, by particles.
+std::map<std::pair<int, int>, int> edges_of(const TriangleMesh& mesh) {
+  std::map<std::pair<int, int>, int> edges;
+  for (const auto& triangle : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) ++edges[std::minmax(triangle[k], triangle[(k + 1) % 3])];
+  return edges;
+}
+
+// Closed lines of edges of one triangle.
+int borders_of(const TriangleMesh& mesh) {
+  std::map<int, std::vector<int>> next;
+  for (const auto& [edge, count] : edges_of(mesh))
+    if (count == 1)
+      next[edge.first].push_back(edge.second), next[edge.second].push_back(edge.first);
+  int borders = 0;
+  std::set<int> seen;
+  for (const auto& [start, unused] : next) {
+    if (!seen.insert(start).second) continue;
+    ++borders;
+    std::vector<int> open{start};
+    while (!open.empty()) {
+      const int at = open.back();
+      open.pop_back();
+      for (const int other : next[at])
+        if (seen.insert(other).second) open.push_back(other);
+    }
+  }
+  return borders;
+}
+
+// Particles less edges plus triangles: 1 of a disc, 0 of a tube, 2 of a ball.
+int euler_number(const TriangleMesh& mesh) {
+  return static_cast<int>(mesh.start.size()) - static_cast<int>(edges_of(mesh).size()) +
+         static_cast<int>(mesh.triangles.size());
+}
+
+std::set<std::string> codes(const Garment& garment) {
+  std::set<std::string> codes;
+  for (const Warning& note : garment.notes) codes.insert(note.code);
+  return codes;
+}
+
+TEST(Garments, ADiscHasTheAreaOfItsPolygonAndComesNearToPiRSquared) {
+  Pattern pattern{{panel("disc", {arc_to({0.1, 0}, {0, 0.1}), arc_to({-0.1, 0}, {0, -0.1})})}, {}};
+  double before = 0;
+  for (const double edge : {0.04, 0.02, 0.01, 0.005}) {
+    const Garment disc = built(pattern, edge);
+    const auto sides =
+        static_cast<double>(disc.edges[0].particles.size() + disc.edges[1].particles.size() - 2);
+    EXPECT_NEAR(flat_area(disc.mesh), 0.01 * sides / 2 * std::sin(2 * pi / sides), 1e-12);
+    EXPECT_NEAR(disc.edges[0].length, 0.1 * pi, 1e-12);
+    EXPECT_EQ(euler_number(disc.mesh), 1);
+    const double error = 0.01 * pi - flat_area(disc.mesh);
+    EXPECT_GT(error, 0);
+    if (before > 0) {
+      EXPECT_LT(error, before / 2.5) << "second order at " << edge;
+    }
+    before = error;
+  }
+}
+
+TEST(Garments, TwoHalfDiscsSewnAreADisc) {
+  const double edge = 0.01;
+  Pattern pattern{{half_disc("right", 0.1), turned(half_disc("left", 0.1), pi)},
+                  {seam({"right", 1}, {"left", 1})}};
+  const Garment sewn = built(pattern, edge);
+  EXPECT_EQ(euler_number(sewn.mesh), 1);
+  EXPECT_EQ(borders_of(sewn.mesh), 1);
+  EXPECT_EQ(sewn.edges[1].particles.size(), sewn.edges[3].particles.size());
+  EXPECT_TRUE(std::equal(sewn.edges[1].particles.begin(), sewn.edges[1].particles.end(),
+                         sewn.edges[3].particles.rbegin()));
+  const Garment whole = built(
+      {{panel("disc", {arc_to({0.1, 0}, {0, 0.1}), arc_to({-0.1, 0}, {0, -0.1})})}, {}}, edge);
+  EXPECT_NEAR(flat_area(sewn.mesh), flat_area(whole.mesh), 1e-12);
+  // and lies as one where its halves are placed side by side
+  for (const Vector3d& place : sewn.mesh.start) EXPECT_LE(place.norm(), 0.1 + 1e-12);
+  double in_space = 0;
+  for (const auto& [a, b, c] : sewn.mesh.triangles) {
+    const auto at = [&](int i) { return sewn.mesh.start[static_cast<std::size_t>(i)]; };
+    in_space += (at(b) - at(a)).cross(at(c) - at(a)).z() / 2;
+  }
+  EXPECT_NEAR(in_space, flat_area(sewn.mesh), 1e-12);
+}
+
+TEST(Garments, ARectangleSewnToItselfIsATubeAtEveryWidth) {
+  for (const double width : {0.004, 0.01, 0.017, 0.025, 0.04, 0.3}) {
+    const Garment tube =
+        built({{rectangle("tube", width, 0.2)}, {seam({"tube", 1}, {"tube", 3})}}, 0.01);
+    EXPECT_EQ(euler_number(tube.mesh), 0) << width;
+    EXPECT_EQ(borders_of(tube.mesh), 2) << width;
+    EXPECT_NEAR(flat_area(tube.mesh), 0.2 * width, 1e-12);
+  }
+}
+
+TEST(Garments, ABagIsClosedButForItsMouth) {
+  const Garment bag = built({{rectangle("front", 0.02, 0.02), rectangle("back", 0.02, 0.02)},
+                             {{{{"front", 3}, {"front", 0}, {"front", 1}},
+                               {{"back", 3}, {"back", 0}, {"back", 1}},
+                               true}}},
+                            0.02);
+  EXPECT_EQ(borders_of(bag.mesh), 1);
+  EXPECT_EQ(euler_number(bag.mesh), 1);
+}
+
+TEST(Garments, SidesOfSeamsHaveEqualCountsHoweverTheyAreDivided) {
+  // a waistband of one edge on three panels, two of which end where the third has a part left
+  Pattern pattern{{rectangle("band", 0.5, 0.04), rectangle("left", 0.2, 0.3),
+                   rectangle("middle", 0.13, 0.3), rectangle("right", 0.31, 0.3)},
+                  {{{{"band", 0}}, {{"left", 2}, {"middle", 2}, {"right", 2, 0.2, 1}}, false}}};
+  const Garment garment = built(pattern, 0.01);
+  const auto particles = [&](std::size_t p, std::size_t e) {
+    const auto& all = garment.edges[4 * p + e].particles;
+    return std::set<int>(all.begin(), all.end());
+  };
+  std::set<int> below;
+  for (const std::size_t p : {1U, 2U, 3U}) below.merge(particles(p, 2));
+  for (const int particle : particles(0, 0)) EXPECT_TRUE(below.contains(particle));
+  // the corner that is not sewn is the end of the seam's last run
+  EXPECT_EQ(garment.edges[4 * 1 + 2].particles.back(), garment.edges[0].particles.front());
+  EXPECT_TRUE(codes(garment).contains("SEAM_UNEQUAL"));
+  EXPECT_EQ(euler_number(garment.mesh), 1 - 2 + 2 - 1 + 1);
+}
+
+TEST(Garments, AGatherSharesItsFullnessEvenly) {
+  Pattern pattern{{rectangle("full", 0.4, 0.1), rectangle("plain", 0.2, 0.1)},
+                  {seam({"full", 2}, {"plain", 0})}};
+  const Garment garment = built(pattern, 0.01);
+  ASSERT_EQ(codes(garment), std::set<std::string>{"SEAM_UNEQUAL"});
+  EXPECT_NE(garment.notes[0].message.find("a ratio of 2:"), std::string::npos);
+  EXPECT_EQ(garment.notes[0].field, "pattern.seams[0]");
+  // one line in 14.1 mm of one side and 7.07 mm of the other
+  EXPECT_EQ(garment.edges[2].particles.size(), 29);
+  const auto& mesh = garment.mesh;
+  std::map<std::pair<int, int>, std::vector<double>> flat;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k)
+      flat[std::minmax(mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3])].push_back(
+          (flat_corner(mesh, t, (k + 1) % 3) - flat_corner(mesh, t, k)).norm());
+  const auto& line = garment.edges[2].particles;
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+    auto lengths = flat[std::minmax(line[i], line[i + 1])];
+    std::sort(lengths.begin(), lengths.end());
+    ASSERT_EQ(lengths.size(), 2);
+    EXPECT_NEAR(lengths[0], 0.2 / 28, 1e-12);
+    EXPECT_NEAR(lengths[1], 0.4 / 28, 1e-12);
+  }
+}
+
+TEST(Garments, SewnParticlesStartInTheMeanOfTheirPlaces) {
+  PatternPanel back = rectangle("back", 0.2, 0.3);
+  back.origin = {0.2, 0, -0.1};
+  back.rotation = Eigen::AngleAxisd(pi, Vector3d::UnitY());
+  PatternPanel front = rectangle("front", 0.2, 0.3);
+  front.origin = {0, 0, 0.1};
+  const Garment garment = built({{front, back}, {seam({"front", 1}, {"back", 3})}}, 0.02);
+  for (const int i : garment.edges[1].particles) {
+    const Vector3d& place = garment.mesh.start[static_cast<std::size_t>(i)];
+    EXPECT_NEAR(place.x(), 0.2, 1e-12);
+    EXPECT_NEAR(place.z(), 0, 1e-12);
+  }
+  for (const int i : garment.edges[3].particles)
+    EXPECT_NEAR(garment.mesh.start[static_cast<std::size_t>(i)].z(), 0.1, 1e-12);
+}
+
+TEST(Garments, ADartIsANotchWhoseSidesAreSewn) {
+  const PatternPanel front =
+      panel("front", {line_to(0.1, 0), line_to(0.2, 0), line_to(0.2, 0.3), line_to(0.11, 0.3),
+                      line_to(0.1, 0.2), line_to(0.09, 0.3), line_to(0, 0.3), line_to(0, 0)});
+  const Garment garment = built({{front}, {seam({"front", 3}, {"front", 4})}}, 0.01);
+  EXPECT_EQ(euler_number(garment.mesh), 1);
+  EXPECT_EQ(borders_of(garment.mesh), 1);
+  EXPECT_EQ(garment.edges[3].particles.front(), garment.edges[4].particles.back());
+}
+
+// Middles of triangles in order of v, then u, to a nanometre.
+std::vector<std::pair<long, long>> middles(const PanelMesh& mesh, double mirror) {
+  std::vector<std::pair<long, long>> all;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const auto at = [&](int i) { return mesh.points[static_cast<std::size_t>(i)]; };
+    const Vector2d middle = (at(a) + at(b) + at(c)) / 3;
+    all.emplace_back(std::lround(middle.y() * 1e9), std::lround(mirror * middle.x() * 1e9));
+  }
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+// Whether each triangle of one mesh is the mirror image of one of the other.
+void expect_mirrored(const PanelMesh& one, const PanelMesh& other) {
+  const auto places = middles(one, 1), images = middles(other, -1);
+  ASSERT_EQ(places.size(), images.size());
+  for (const auto& [v, u] : places) {
+    const auto begin = std::lower_bound(images.begin(), images.end(), std::pair(v - 2, 0L));
+    EXPECT_TRUE(std::any_of(begin, images.end(),
+                            [&, v = v, u = u](const auto& image) {
+                              return std::abs(image.first - v) <= 2 &&
+                                     std::abs(image.second - u) <= 2;
+                            }))
+        << u << ' ' << v << " nm";
+  }
+}
+
+// A front of a shirt: round neck, sloping shoulders, hollow armholes, a curved hem.
+std::vector<Vector2d> shirt_border(double lean, double edge) {
+  PatternPanel front = panel("front", {{.points = {{0, -0.03}, {0.25, 0}}},
+                                       line_to(0.24, 0.4),
+                                       {.points = {{0.17, 0.41}, {0.18 + lean, 0.62}}},
+                                       line_to(0.08, 0.66),
+                                       {.points = {{0.05, 0.57}, {-0.05, 0.57}, {-0.08, 0.66}}},
+                                       line_to(-0.18 + lean, 0.62),
+                                       {.points = {{-0.17, 0.41}, {-0.24, 0.4}}},
+                                       line_to(-0.25, 0)});
+  const Garment garment = built({{front}, {}}, edge);
+  std::vector<Vector2d> border;
+  for (const GarmentEdge& each : garment.edges)
+    for (std::size_t i = 0; i + 1 < each.particles.size(); ++i)
+      border.push_back(garment.mesh.flat[static_cast<std::size_t>(each.particles[i])]);
+  return border;
+}
+
+TEST(Garments, ASymmetricPanelHasSymmetricTriangles) {
+  for (const double edge : {0.04, 0.02, 0.01})
+    for (const double grain : {0.0, pi / 2}) {
+      const PanelMesh mesh = mesh_panel(shirt_border(0, edge), grain, edge);
+      expect_mirrored(mesh, mesh);
+    }
+}
+
+TEST(Garments, MirroredPanelsHaveMirroredTriangles) {
+  for (const double grain : {0.0, 0.3}) {
+    const std::vector<Vector2d> left = shirt_border(0.02, 0.01);
+    std::vector<Vector2d> right;
+    for (auto point = left.rbegin(); point != left.rend(); ++point)
+      right.emplace_back(-point->x(), point->y());
+    expect_mirrored(mesh_panel(left, grain, 0.01), mesh_panel(right, -grain, 0.01));
+  }
+}
+
+TEST(Garments, TrianglesInsideLieAlongTheGrain) {
+  const double grain = 0.4, edge = 0.01;
+  const PanelMesh mesh = mesh_panel({{0, 0}, {0.3, 0}, {0.3, 0.3}, {0, 0.3}}, grain, edge);
+  const Vector2d along(-std::sin(grain), std::cos(grain));
+  int inner = 0, even = 0;
+  for (const auto& triangle : mesh.triangles) {
+    std::array<Vector2d, 3> corner;
+    for (std::size_t k = 0; k < 3; ++k)
+      corner[k] = mesh.points[static_cast<std::size_t>(triangle[k])];
+    const Vector2d middle = (corner[0] + corner[1] + corner[2]) / 3;
+    if ((middle - Vector2d(0.15, 0.15)).lpNorm<Eigen::Infinity>() > 0.12) continue;
+    ++inner;
+    bool has_one = false;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vector2d side = corner[(k + 1) % 3] - corner[k];
+      EXPECT_NEAR(side.norm(), edge, 1e-3 * edge);
+      has_one |= std::abs(side.normalized().dot(along)) > 1 - 1e-6;
+    }
+    even += has_one ? 1 : 0;
+  }
+  EXPECT_GT(inner, 1000);
+  EXPECT_EQ(even, inner);
+}
+
+// An outline around the origin of 5 to 12 lines, straight or curved.
+PatternPanel random_panel(std::mt19937& random) {
+  const auto within = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random()) * 0x1p-32;
+  };
+  const int corners = 5 + static_cast<int>(random() % 8);
+  std::vector<Vector2d> at;
+  for (int i = 0; i < corners; ++i) {
+    const double angle = 2 * pi * (i + within(-0.25, 0.25)) / corners;
+    at.push_back(within(0.1, 0.25) * Vector2d(std::cos(angle), std::sin(angle)));
+  }
+  PatternPanel random_one = panel("any", {});
+  random_one.grain = within(-3, 3);
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    const Vector2d end = at[(i + 1) % at.size()], chord = end - at[i];
+    PatternEdge edge;
+    const auto kind = random() % 3;
+    if (kind > 0)
+      edge.points.push_back((at[i] + end) / 2 +
+                            within(-0.1, 0.1) * Vector2d(chord.y(), -chord.x()));
+    edge.points.push_back(end);
+    edge.arc = kind == 2;
+    random_one.edges.push_back(edge);
+  }
+  return random_one;
+}
+
+TEST(Garments, TrianglesOfRandomOutlinesAreNoLowerThanAThirdOfAnEdgeWhereNothingIsNoted) {
+  std::mt19937 random(5);
+  int plain = 0;
+  for (int round = 0; round < 300; ++round) {
+    const double edge = round % 2 == 0 ? 0.01 : 0.02;
+    const PatternPanel any = random_panel(random);
+    const Garment garment = built({{any}, {}}, edge);
+    EXPECT_EQ(euler_number(garment.mesh), 1) << round;
+    if (!garment.notes.empty()) continue;
+    ++plain;
+    EXPECT_GE(garment.least_height, 0.35 * edge) << round;
+    std::vector<Vector2d> border;
+    for (const GarmentEdge& each : garment.edges)
+      for (std::size_t i = 0; i + 1 < each.particles.size(); ++i)
+        border.push_back(garment.mesh.flat[static_cast<std::size_t>(each.particles[i])]);
+    EXPECT_NEAR(flat_area(garment.mesh), area_within(border), 1e-12);
+  }
+  EXPECT_GT(plain, 280);
+}
+
+TEST(Garments, APatternHasTheSameBitsTwice) {
+  std::mt19937 random(3);
+  Pattern pattern{{random_panel(random), rectangle("tube", 0.3, 0.2)},
+                  {seam({"tube", 1}, {"tube", 3})}};
+  const Garment one = built(pattern, 0.01), other = built(pattern, 0.01);
+  EXPECT_EQ(one.mesh.triangles, other.mesh.triangles);
+  EXPECT_EQ(one.mesh.flat_triangles, other.mesh.flat_triangles);
+  EXPECT_EQ(one.mesh.flat, other.mesh.flat);
+  EXPECT_EQ(one.mesh.start, other.mesh.start);
+}
+
+TEST(Garments, RefinementKeepsLengthsAndComesToTheCurvesArea) {
+  const auto area = [](double edge) { return area_within(shirt_border(0, edge)); };
+  const double finest = area(0.0025);
+  EXPECT_NEAR(area(0.04), finest, 0.008 * finest);
+  EXPECT_NEAR(area(0.02), finest, 0.002 * finest);
+  EXPECT_NEAR(area(0.01), finest, 0.0005 * finest);
+}
+
+TEST(Garments, PanelsThatSeamsTurnOverAreMirrored) {
+  PatternPanel front =
+      panel("front", {line_to(0.2, 0), line_to(0.25, 0.3), line_to(0, 0.3), line_to(0, 0)});
+  PatternPanel lining = front;
+  lining.name = "lining";
+  Pattern pattern{{front, lining}, {{{{"front", 1}}, {{"lining", 1}}, true}}};
+  const Garment garment = built(pattern, 0.02);
+  ASSERT_EQ(codes(garment), std::set<std::string>{"PANEL_TURNED"});
+  EXPECT_EQ(garment.notes[0].field, "pattern.panels[1]");
+  EXPECT_EQ(borders_of(garment.mesh), 1);
+  // both start where the pattern has them
+  for (const Vector3d& place : garment.mesh.start) EXPECT_GE(place.x(), -1e-12);
+  // a band sewn to itself face to back has one side
+  pattern = {{rectangle("band", 0.3, 0.04)}, {{{{"band", 1}}, {{"band", 3}}, true}}};
+  EXPECT_EQ(refused(pattern)[0].field, "pattern.seams[0].same_direction");
+}
+
+TEST(Garments, ShortEdgesBecomePointsAndSharpCornersAreNoted) {
+  Pattern pattern{{panel("front", {line_to(0.2, 0), line_to(0.2, 0.3), line_to(0.001, 0.3),
+                                   line_to(0, 0.299), line_to(0, 0)})},
+                  {}};
+  const Garment blunt = built(pattern, 0.01);
+  ASSERT_EQ(codes(blunt), std::set<std::string>{"EDGE_SHORT"});
+  EXPECT_EQ(blunt.notes[0].field, "pattern.panels[0].edges[3]");
+  EXPECT_EQ(blunt.edges[3].particles.size(), 1);
+  EXPECT_GE(blunt.least_height, 0.0035);
+  pattern = {{panel("godet", {line_to(0.1, 0), line_to(0, 0.5), line_to(0, 0)})}, {}};
+  const Garment sharp = built(pattern, 0.01);
+  ASSERT_EQ(codes(sharp), std::set<std::string>{"CORNER_SHARP"});
+  EXPECT_EQ(sharp.notes[0].field, "pattern.panels[0].edges[2]");
+  EXPECT_NE(sharp.notes[0].message.find("11.31 degrees"), std::string::npos);
+  pattern = {{rectangle("strap", 0.003, 0.3)}, {}};
+  EXPECT_EQ(codes(built(pattern, 0.01)), (std::set<std::string>{"EDGE_SHORT", "PANEL_NARROW"}));
+}
+
+TEST(Garments, WhatCannotBeCutOrSewnIsRefusedByItsField) {
+  const auto field_of = [](const Pattern& pattern) { return refused(pattern)[0].field; };
+  const PatternPanel good = rectangle("front", 0.2, 0.3);
+  EXPECT_EQ(field_of({{}, {}}), "pattern.panels");
+  EXPECT_EQ(field_of({{good, good}, {}}), "pattern.panels[1].name");
+  EXPECT_EQ(field_of({{good}, {seam({"front", 1}, {"back", 3})}}),
+            "pattern.seams[0].second_side[0].panel");
+  EXPECT_EQ(field_of({{good}, {seam({"front", 4}, {"front", 3})}}),
+            "pattern.seams[0].first_side[0].edge");
+  EXPECT_EQ(field_of({{good}, {seam({"front", 1, 0.5, 0.4}, {"front", 3})}}),
+            "pattern.seams[0].first_side[0].end");
+  EXPECT_EQ(
+      field_of(
+          {{good}, {seam({"front", 1}, {"front", 3}), seam({"front", 0}, {"front", 1, 0.5, 1})}}),
+      "pattern.seams[1].second_side[0]");
+  EXPECT_EQ(field_of({{good}, {{{}, {{"front", 1}}}}}), "pattern.seams[0].first_side");
+  EXPECT_EQ(field_of({{panel("line", {line_to(1, 0)})}, {}}), "pattern.panels[0].edges");
+  PatternPanel bad = good;
+  bad.edges[2].points[0].x() = std::nan("");
+  EXPECT_EQ(field_of({{bad}, {}}), "pattern.panels[0].edges[2].points_m");
+  bad = panel("bow", {line_to(0.2, 0), line_to(0, 0.2), line_to(0.2, 0.2), line_to(0, 0)});
+  EXPECT_EQ(field_of({{bad}, {}}), "pattern.panels[0].edges");
+  EXPECT_NE(refused({{bad}, {}})[0].message.find("edge 1 and edge 3"), std::string::npos);
+  bad = good;
+  std::reverse(bad.edges.begin(), bad.edges.end());
+  EXPECT_NE(refused({{bad}, {}})[0].message.find("clockwise"), std::string::npos);
+  bad = good;
+  bad.edges[0] = arc_to({-0.1, 0}, {0.2, 0});
+  EXPECT_EQ(field_of({{bad}, {}}), "pattern.panels[0].edges[0].arc");
+  EXPECT_EQ(refused({{good}, {}}, 0.2)[0].field, "edge_m");
+  EXPECT_EQ(refused({{rectangle("sail", 5, 5)}, {}}, 0.01)[0].field, "edge_m");
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -89,18 +89,26 @@ Outline bodice_outline(const Bodice& b, bool front) {
   return outline;
 }
 
-// The front half of the left sleeve, v up the arm, u = 0 in its middle; the cap is as long as the
-// armhole, and eased by 1.5 %.
-Outline sleeve_outline(double half_width, double hem_half_width, double length, double armhole) {
+// Half widths and lengths of a sleeve, m.
+struct Sleeve {
+  double upper, cuff;
+  double length;    // of the underarm seam, v
+  double drop = 0;  // of the cuff across the arm
+};
+
+// The front half of the left sleeve, v up the arm, u = 0 in its upper middle; the cap is as long as
+// the armhole, and eased by 1.5 %.
+Outline sleeve_outline(const Sleeve& sleeve, double armhole) {
   constexpr double kEase = 1.015;
-  const double u = half_width / 2, hem = hem_half_width / 2;
+  const double u = sleeve.upper / 2, length = sleeve.length;
+  const double below = -sleeve.cuff / 2 - sleeve.drop, above = sleeve.cuff / 2 - sleeve.drop;
   const auto with_cap = [&](double height) {
-    Outline outline({-hem, 0});
-    outline.line("cuff", {hem, 0});
+    Outline outline({below, 0});
+    outline.line("cuff", {above, 0});
     outline.line("over", {u, length + height});
-    outline.curve("cap", {Vector2d(u - 0.45 * half_width, length + height),
-                          Vector2d(-u + 0.35 * half_width, length), Vector2d(-u, length)});
-    outline.line("under", {-hem, 0});
+    outline.curve("cap", {Vector2d(0.1 * u, length + height), Vector2d(-0.3 * u, length),
+                          Vector2d(-u, length)});
+    outline.line("under", {below, 0});
     return outline;
   };
   double low = 0, high = 2 * armhole;
@@ -112,27 +120,34 @@ Outline sleeve_outline(double half_width, double hem_half_width, double length, 
 }
 
 // Sleeves of two halves around both arms, sewn into the armholes of front and back.
-void add_sleeves(Draft& draft, const DressForm& form, const Bodice& bodice, double half_width,
-                 double cuff_half_width, double length) {
-  const Outline sleeve = sleeve_outline(half_width, cuff_half_width, length,
-                                        bodice_outline(bodice, true).length("armhole-left"));
-  // v runs up the arm; the cap ends at the shoulder's tip, or the underarm beside the bodice's
+void add_sleeves(Draft& draft, const DressForm& form, const Bodice& bodice, Sleeve sleeve) {
+  const double armhole = bodice_outline(bodice, true).length("armhole-left");
+  // v runs up the arm, u across it; the cap ends at the shoulder's tip, or the underarm beside the
+  // bodice's, and as high where that leaves room for the arm
   const auto& arm = form.arm;
   const double turn = std::numbers::pi / 2 + std::atan2(arm.direction.y(), arm.direction.x());
-  const double tip = arm.radius / 2 + sleeve.most_v() - length,
-               aside =
-                   (bodice.chest_half + kClear - arm.top.x() + half_width / 2 * std::cos(turn)) /
-                   arm.direction.x();
-  const Vector3d cuff = arm.top + (std::max(tip, aside) + length) * arm.direction;
+  const Vector3d across(std::cos(turn), std::sin(turn), 0);
+  const double tip = arm.radius / 2 + sleeve_outline(sleeve, armhole).most_v() - sleeve.length;
+  const auto along = [&](double below) {  // from the joint to the underarm, as far below the axis
+    const double out = bodice.chest_half + kClear - arm.top.x() + below * across.x();
+    return std::max(tip, out / arm.direction.x());
+  };
+  const double half = sleeve.upper / 2, least = std::min(half, arm.radius + kClear);
+  const double low = arm.top.y() + along(half) * arm.direction.y() - half * across.y();
+  const double below = std::clamp(half - (bodice.underarm - low) / across.y(), least, half);
+  sleeve.drop = half - below;  // the cuff stays around the arm
+  const Outline outline = sleeve_outline(sleeve, armhole);
+  const Vector3d cuff =
+      arm.top + (along(below) + sleeve.length) * arm.direction + sleeve.drop * across;
   const double deep = arm.radius + kClear, mid = (arm.top.z() + cuff.z()) / 2,
                lean = std::abs(arm.top.z() - cuff.z()) / 2;
   PanelPlace place{{cuff.x(), cuff.y(), mid + lean + deep},
                    Quaterniond(Eigen::AngleAxisd(turn, Vector3d::UnitZ()))};
   const PanelPlace back = behind(place, mid - lean - deep);
-  draft.add("sleeve-front-left", sleeve, place);
-  draft.add("sleeve-back-left", sleeve.mirrored(), back);
-  draft.add("sleeve-front-right", sleeve.mirrored(), mirrored(place));
-  draft.add("sleeve-back-right", sleeve, mirrored(back));
+  draft.add("sleeve-front-left", outline, place);
+  draft.add("sleeve-back-left", outline.mirrored(), back);
+  draft.add("sleeve-front-right", outline.mirrored(), mirrored(place));
+  draft.add("sleeve-back-right", outline, mirrored(back));
   for (const std::string side : kSides) {
     const std::string sleeve_front = "sleeve-front-" + side, sleeve_back = "sleeve-back-" + side;
     draft.sew({"front", {of_side("armhole", side)}}, {sleeve_front, {"cap"}});
@@ -187,7 +202,7 @@ v1::Pattern tshirt(const DressForm& form) {
   b.hem_half = std::max(b.chest_half, (form.girth("hip").wanted + 0.04) / 4);
   add_bodice(draft, b, body);
   const double half = upper_arm_half(form, 0.09);
-  add_sleeves(draft, form, b, half, 0.92 * half, 0.07);
+  add_sleeves(draft, form, b, {half, 0.92 * half, 0.07});
   return draft.take();
 }
 
@@ -287,7 +302,7 @@ v1::Pattern dress(const DressForm& form) {
   b.front_neck = 0.11;
   add_bodice(draft, b, body);
   const double half = upper_arm_half(form, 0.08);
-  add_sleeves(draft, form, b, half, 0.92 * half, 0.05);
+  add_sleeves(draft, form, b, {half, 0.92 * half, 0.05});
   const double waist_half = kGathers * b.hem_half, hem = 0.27 * form.stature;
   const double hem_half =
       std::max(waist_half, (form.girth("hip").wanted + 0.1) / 4) + 0.25 * (b.hem - hem);
@@ -314,7 +329,7 @@ v1::Pattern shirt(const DressForm& form) {
   b.front_neck = 0.075;
   add_bodice(draft, b, body);
   const double half = upper_arm_half(form, 0.12);
-  add_sleeves(draft, form, b, half, 0.62 * half, form.arm.length - 0.22);
+  add_sleeves(draft, form, b, {half, 0.62 * half, form.arm.length - 0.22});
   for (const bool front : {true, false}) {
     const std::string name = front ? "front" : "back";
     const double neck = bodice_outline(b, front).length("neck");

@@ -11,7 +11,7 @@ namespace {
 // Within 100 columns on one line, else a member a line.
 std::string laid_out(const Json& json, std::size_t indent) {
   constexpr std::size_t kMost = 100;
-  const std::string flat = json.dump();
+  std::string flat = json.dump();
   if (indent + flat.size() <= kMost || !json.is_structured() || json.empty()) return flat;
   const bool list = json.is_array();
   const std::string space(indent + 2, ' ');

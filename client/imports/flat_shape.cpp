@@ -149,6 +149,46 @@ bool flatten(ImportedMesh& mesh) {
   return true;
 }
 
+bool flatten_pieces(ImportedMesh& mesh) {
+  constexpr double kFlat = 1e-4, kApart = 0.05;  // of the size
+  Unions unions(mesh.positions.size());
+  for (const auto& [a, b, c] : mesh.triangles) unions.join(a, b), unions.join(b, c);
+  std::vector<int> piece;
+  const int count = unions.number(piece);
+  std::vector<Vector3d> normal(as_index(count), Vector3d::Zero());
+  std::vector<int> first(as_index(count), -1);
+  for (const auto& triangle : mesh.triangles) {
+    const auto p = as_index(piece[as_index(triangle[0])]);
+    normal[p] += area_vector(mesh, triangle);
+    if (first[p] < 0) first[p] = triangle[0];
+  }
+  const double size = size_of(mesh.positions);
+  std::vector<double> least(as_index(count), 0), most(as_index(count), 0);
+  std::vector<Vector2d> flat(mesh.positions.size(), Vector2d::Zero());
+  for (std::size_t i = 0; i < flat.size(); ++i) {
+    const auto p = as_index(piece[i]);
+    if (first[p] < 0) continue;  // a point of no triangle
+    if (normal[p].norm() == 0) return false;
+    const Vector3d upright = normal[p].normalized(),
+                   offset = mesh.positions[i] - mesh.positions[as_index(first[p])];
+    if (std::abs(offset.dot(upright)) > kFlat * size) return false;
+    const auto [u, v] = axes_of(upright);
+    flat[i] = {offset.dot(u), offset.dot(v)};
+    least[p] = std::min(least[p], flat[i].x());
+    most[p] = std::max(most[p], flat[i].x());
+  }
+  double right = 0;
+  for (std::size_t p = 0; p < as_index(count); ++p) {
+    const double width = most[p] - least[p];
+    most[p] = right - least[p];  // by what it is moved
+    right += width + kApart * size;
+  }
+  for (std::size_t i = 0; i < flat.size(); ++i) flat[i].x() += most[as_index(piece[i])];
+  mesh.flat = std::move(flat);
+  mesh.corners = mesh.triangles;
+  return true;
+}
+
 ScaleFound find_scale(const ImportedMesh& mesh) {
   std::vector<double> all;
   std::vector<std::vector<double>> of_panel(mesh.panels.size());

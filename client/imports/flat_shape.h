@@ -30,6 +30,8 @@ int turn_mirrored_islands(ImportedMesh& mesh, double grain_rad);
 // Takes the flat shape from a mesh that lies in a plane: u to the right of who looks at its front,
 // v up (of one that lies level, away). False where it lies in none.
 bool flatten(ImportedMesh& mesh);
+// The same of each piece that hangs together, beside each other.
+bool flatten_pieces(ImportedMesh& mesh);
 
 // Lengths in space over those in the flat shape, of all edges.
 struct ScaleFound {

@@ -8,6 +8,7 @@
 #include "client/imports/mend.h"
 #include "client/imports/mesh_check.h"
 #include "client/imports/obj.h"
+#include "client/imports/stitches.h"
 #include "client/input_file.h"
 #include "client/output/text.h"
 
@@ -161,6 +162,7 @@ Import import_mesh(const std::string& path, const std::string& bytes,
   Import import{read_mesh(path, bytes)};
   ImportedMesh& mesh = import.mesh;
   place_in_space(mesh, options);
+  sew(mesh);
   join_what_is_equal(mesh, !is_obj(path), options.mend);
 
   import.has_uv = find_flat_shape(path, mesh);

@@ -27,6 +27,12 @@ struct ImportedMesh {
     int line;  // from 1, of an OBJ file
   };
 
+  // A point sewn to the line between two others, at that share of the way to the second.
+  struct Stitch {
+    int point, first, second;
+    double share;
+  };
+
   std::vector<Vector3d> positions;  // of particles, in the unit of the file, then m
   std::vector<Vector2d> flat;       // (u, v) in the unit of the file, then m
   Triangles triangles;              // particles of each
@@ -36,6 +42,7 @@ struct ImportedMesh {
   std::vector<std::string> panels;  // names as scenes have them
   std::string panels_by;            // what makes a panel in the file: "g"
   std::vector<std::string> parts;   // of a glTF file: "shirt, primitive 0"
+  std::vector<Stitch> stitches;     // of an OBJ file of C-IPC, until they are sewn
   std::vector<std::string> notes;   // what was done on the way, a sentence each
 };
 

@@ -7,7 +7,9 @@
 #include <charconv>
 #include <cmath>
 #include <istream>
+#include <locale>
 #include <map>
+#include <sstream>
 #include <streambuf>
 
 #include "client/imports/polygon.h"
@@ -205,10 +207,39 @@ class Reading {
   std::vector<Fault> bad_numbers_, bad_faces_;
 };
 
+// "stitch POINT FIRST SECOND SHARE"
+void read_stitches(const std::string& path, const std::string& text, ImportedMesh& mesh) {
+  constexpr std::string_view kWord = "stitch ";
+  std::vector<Fault> faults;
+  std::istringstream lines(text);
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    if (!line.starts_with(kWord)) continue;
+    std::istringstream words(line.substr(kWord.size()));
+    words.imbue(std::locale::classic());
+    ImportedMesh::Stitch stitch{};
+    words >> stitch.point >> stitch.first >> stitch.second >> stitch.share;
+    const auto count = static_cast<int>(mesh.positions.size());
+    const auto known = [&](int i) { return i >= 0 && i < count; };
+    if (words.fail() || !known(stitch.point) || !known(stitch.first) || !known(stitch.second) ||
+        !(stitch.share >= 0 && stitch.share <= 1))
+      faults.push_back(
+          {fmt::format("line {}", number),
+           fmt::format("a stitch has three points of 0 to {} and a share of 0 to 1", count - 1)});
+    mesh.stitches.push_back(stitch);
+  }
+  std::vector<Fault> shown;
+  add_some(shown, faults);
+  if (!shown.empty()) throw mesh_problem(path, shown);
+}
+
 }  // namespace
 
 ImportedMesh read_obj(const std::string& path, const std::string& text) {
-  return Reading(text).run(path);
+  ImportedMesh mesh = Reading(text).run(path);
+  read_stitches(path, text, mesh);
+  return mesh;
 }
 
 }  // namespace weft::client

@@ -33,6 +33,42 @@ struct Break {
   double along;  // of the side's length, 0 to 1
 };
 
+// Two places that are sewn together, as shares of both sides' lengths.
+using Places = std::pair<double, double>;
+
+// Where both sides are cut: breaks that lie next to each other, by that share at most, are sewn
+// together; each other one to what lies between those as it does.
+std::vector<Places> pair_breaks(const std::vector<Break>& first, const std::vector<Break>& second,
+                                double near) {
+  std::vector<Places> pairs;
+  for (std::size_t i = 0, j = 0; i < first.size() && j < second.size();) {
+    const double apart = second[j].along - first[i].along;
+    const bool both_ends = (i + 1 == first.size()) == (j + 1 == second.size());
+    if (std::abs(apart) <= near && both_ends)
+      pairs.emplace_back(first[i++].along, second[j++].along);
+    else
+      ++(apart > 0 ? i : j);
+  }
+  std::vector<Places> all = pairs;
+  const auto add_others = [&](const std::vector<Break>& breaks, double Places::*own,
+                              double Places::*other) {
+    std::size_t at = 0;
+    for (const Break& each : breaks) {
+      while (pairs[at + 1].*own < each.along && at + 2 < pairs.size()) ++at;
+      const Places &before = pairs[at], &after = pairs[at + 1];
+      if (each.along == before.*own || each.along == after.*own) continue;
+      const double part = (each.along - before.*own) / (after.*own - before.*own);
+      Places& added = all.emplace_back();
+      added.*own = each.along;
+      added.*other = before.*other + part * (after.*other - before.*other);
+    }
+  };
+  add_others(first, &Places::first, &Places::second);
+  add_others(second, &Places::second, &Places::first);
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
 class Cutter {
  public:
   Cutter(const Pattern& pattern, double edge, std::string field)
@@ -104,43 +140,14 @@ class Cutter {
     return sum;
   }
 
-  // Pairs breaks of both sides that lie next to each other; gives each other one a partner.
+  // Cuts both sides at each other's breaks.
   void sew(const PatternSeam& seam, const std::string& field) {
     const std::vector<Break> first = breaks_of(seam.first, false),
                              second = breaks_of(seam.second, !seam.same_direction);
     const double lengths[2] = {length_of(seam.first), length_of(seam.second)};
     note_unequal(seam, field, lengths[0], lengths[1]);
-    const double near = edge_ / 2 / std::max(lengths[0], lengths[1]);
-    std::vector<std::pair<double, double>> anchors;
-    for (std::size_t i = 0, j = 0; i < first.size() && j < second.size();) {
-      const double apart = second[j].along - first[i].along;
-      const bool both_ends = (i + 1 == first.size()) == (j + 1 == second.size());
-      if (std::abs(apart) <= near && both_ends)
-        anchors.emplace_back(first[i++].along, second[j++].along);
-      else
-        ++(apart > 0 ? i : j);
-    }
-    // places along the first side, and what they are on the second
-    std::vector<std::pair<double, double>> places = anchors;
-    const auto add_others = [&](const std::vector<Break>& breaks, bool of_first) {
-      std::size_t anchor = 0;
-      const auto own = [&](std::size_t k) {
-        return of_first ? anchors[k].first : anchors[k].second;
-      };
-      const auto other = [&](std::size_t k) {
-        return of_first ? anchors[k].second : anchors[k].first;
-      };
-      for (const Break& each : breaks) {
-        while (own(anchor + 1) < each.along && anchor + 2 < anchors.size()) ++anchor;
-        if (each.along == own(anchor) || each.along == own(anchor + 1)) continue;
-        const double part = (each.along - own(anchor)) / (own(anchor + 1) - own(anchor));
-        const double there = other(anchor) + part * (other(anchor + 1) - other(anchor));
-        places.emplace_back(of_first ? std::pair(each.along, there) : std::pair(there, each.along));
-      }
-    };
-    add_others(first, true);
-    add_others(second, false);
-    std::sort(places.begin(), places.end());
+    const std::vector<Places> places =
+        pair_breaks(first, second, edge_ / 2 / std::max(lengths[0], lengths[1]));
     for (std::size_t k = 0; k + 1 < places.size(); ++k) {
       const int a = add_piece(seam.first, first, false, places[k].first, places[k + 1].first);
       const int b = add_piece(seam.second, second, !seam.same_direction, places[k].second,

@@ -148,6 +148,7 @@ class PatternCheck {
   void check_overlaps() {
     struct Use {
       const EdgeRun* run;
+      std::size_t seam;
       std::string place;
     };
     std::map<std::pair<std::string, int>, std::vector<Use>> uses;
@@ -156,7 +157,7 @@ class PatternCheck {
         const auto& runs = first ? pattern_.seams[s].first : pattern_.seams[s].second;
         for (std::size_t r = 0; r < runs.size(); ++r)
           uses[{runs[r].panel, runs[r].edge}].push_back(
-              {&runs[r],
+              {&runs[r], s,
                join(field_, ".seams[", s, "].", first ? "first" : "second", "_side[", r, "]")});
       }
     for (auto& [edge, all] : uses) {
@@ -165,8 +166,9 @@ class PatternCheck {
       for (std::size_t i = 1; i < all.size(); ++i)
         if (all[i].run->begin < all[i - 1].run->end - kRunGap)
           problem(all[i].place, "panel ", edge.first, ", edge ", edge.second, " from ",
-                  all[i].run->begin, " to ", all[i].run->end, " is sewn twice: ", all[i - 1].place,
-                  " has it from ", all[i - 1].run->begin, " to ", all[i - 1].run->end);
+                  all[i].run->begin, " to ", all[i].run->end, " is sewn twice: seam ",
+                  all[i - 1].seam, " has it from ", all[i - 1].run->begin, " to ",
+                  all[i - 1].run->end);
     }
   }
 

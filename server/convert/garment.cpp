@@ -57,8 +57,8 @@ class PatternReader {
       const google::protobuf::RepeatedPtrField<v1::EdgeRun>& messages) {
     std::vector<EdgeRun> runs;
     for (const v1::EdgeRun& run : messages)
-      runs.push_back(
-          {run.panel(), run.edge(), run.has_begin() ? run.begin() : 0, run.has_end() ? run.end() : 1});
+      runs.push_back({run.panel(), run.edge(), run.has_begin() ? run.begin() : 0,
+                      run.has_end() ? run.end() : 1});
     return runs;
   }
 

@@ -6,9 +6,11 @@
 
 #include "client/garments/garment_templates.h"
 #include "client/garments/pattern_file.h"
+#include "client/imports/import.h"
 #include "client/json_file.h"
 #include "client/scene_file.h"
 #include "tests/client/client_test.h"
+#include "tests/client/mesh_files.h"
 
 namespace weft::testing {
 namespace {
@@ -23,26 +25,7 @@ using Json = nlohmann::ordered_json;
 
 // A front and a back of a skirt, the back drawn clockwise as it looks the other way, in cm.
 Json two_panels() {
-  return Json::parse(R"({
-    "pattern": {
-      "panels": {
-        "Front": {
-          "translation": [0, 90, 20], "rotation": [0, 0, 0],
-          "vertices": [[-30, 0], [30, 0], [20, 50], [-20, 50]],
-          "edges": [{"endpoints": [0, 1]}, {"endpoints": [1, 2]},
-                    {"endpoints": [2, 3], "label": "Waist",
-                     "curvature": {"type": "quadratic", "params": [[0.5, 0.1]]}},
-                    {"endpoints": [3, 0]}]},
-        "back": {
-          "translation": [0, 90, -20], "rotation": [0, 0, 0],
-          "vertices": [[-30, 0], [30, 0], [20, 50], [-20, 50]],
-          "edges": [{"endpoints": [0, 3]},
-                    {"endpoints": [3, 2],
-                     "curvature": {"type": "quadratic", "params": [[0.5, -0.1]]}},
-                    {"endpoints": [2, 1]}, {"endpoints": [1, 0]}]}},
-      "stitches": [[{"panel": "Front", "edge": 1}, {"panel": "back", "edge": 2}],
-                   [{"panel": "Front", "edge": 3}, {"panel": "back", "edge": 0}]]},
-    "properties": {"curvature_coords": "relative", "units_in_meter": 100}})");
+  return Json::parse(read_file(WEFT_TEST_DATA_DIR "/garments/skirt_specification.json"));
 }
 
 client::ImportedPattern imported(const Json& json) {
@@ -90,18 +73,20 @@ TEST(GarmentCode, PanelsDrawnFromTheBackAreMirroredAndStayWhereTheyAre) {
 }
 
 TEST(GarmentCode, ArcsPassThroughTheirMiddle) {
-  for (const bool large : {false, true})
-    for (const bool right : {false, true}) {
-      Json json = two_panels();
-      const double radius = large ? 50 : 30;
-      json["pattern"]["panels"]["Front"]["edges"][0]["curvature"] = {
-          {"type", "circle"}, {"params", {radius, large ? 1 : 0, right ? 1 : 0}}};
-      const v1::PatternEdge edge = imported(json).pattern.panels(0).edges(0);
-      EXPECT_TRUE(edge.arc());
-      // chord of 60 cm: the sagitta is R - sqrt(R^2 - 30^2), or with the plus
-      const double rise = large ? 0.9 : 0.3;
-      EXPECT_THAT(points(edge), ElementsAre(0, right ? -rise : rise, 0.3, 0));
-    }
+  struct Arc {
+    double radius;  // cm
+    int large, right;
+    double middle;  // v, m: R - sqrt(R^2 - 30^2) from the chord of 60 cm, or with the plus
+  };
+  for (const Arc& arc : {Arc{30, 0, 0, 0.3}, Arc{30, 0, 1, -0.3}, Arc{50, 0, 0, 0.1},
+                         Arc{50, 0, 1, -0.1}, Arc{50, 1, 1, -0.9}}) {
+    Json json = two_panels();
+    json["pattern"]["panels"]["Front"]["edges"][0]["curvature"] = {
+        {"type", "circle"}, {"params", {arc.radius, arc.large, arc.right}}};
+    const v1::PatternEdge edge = imported(json).pattern.panels(0).edges(0);
+    EXPECT_TRUE(edge.arc());
+    EXPECT_THAT(points(edge), ElementsAre(0, arc.middle, 0.3, 0));
+  }
 }
 
 TEST(GarmentCode, TheOlderListOfCurvatureAbsoluteOnesAndCentredPanelsAreRead) {
@@ -175,6 +160,48 @@ TEST(GarmentCode, FaultsAreToldWithFilePanelAndEdge) {
               HasSubstr("properties.units_in_meter 0 is not within 0.001 to 1e6"));
 }
 
+// Two squares of 5 x 5 points beside each other, one 0.2 m in front, with what follows.
+std::string stage(const std::string& stitches, bool uv = false) {
+  return lattice_obj({.spacing = 0.1, .uv = uv}) +
+         lattice_obj({.spacing = 0.1, .z = 0.2, .uv = uv, .first = 25}) + stitches;
+}
+
+TEST(StageObj, StitchedPointsAreOneInTheMeanOfTheirPlaces) {
+  std::string stitches = "seam 5\n";
+  // the left column of one to that of the other
+  for (int row = 0; row < 5; ++row)
+    stitches += "stitch " + std::to_string(5 * row) + ' ' + std::to_string(25 + 5 * row) + ' ' +
+                std::to_string(26 + 5 * row) + " 0\n";
+  client::ImportOptions mended;
+  mended.mend = true;
+  const client::Import import = client::import_mesh("stage.obj", stage(stitches), mended);
+  EXPECT_EQ(import.mesh.positions.size(), 45);
+  EXPECT_EQ(import.mesh.panels.size(), 2);
+  EXPECT_THAT(import.mesh.notes, ::testing::Contains(HasSubstr("5 stitches sewn")));
+  int at_seam = 0;
+  for (const auto& place : import.mesh.positions) at_seam += std::abs(place.z() - 0.1) < 1e-12;
+  EXPECT_EQ(at_seam, 5);
+  // the flat shape is that of the squares before
+  double area = 0;
+  for (std::size_t t = 0; t < import.mesh.triangles.size(); ++t) {
+    const auto corners = client::flat_corners(import.mesh, t);
+    area += client::signed_area(corners);
+  }
+  EXPECT_NEAR(area, 2 * 0.16, 1e-9);
+}
+
+TEST(StageObj, FaultsOfStitchesAreToldWithTheirLine) {
+  for (const char* wrong : {"stitch 3 99 4 0\n", "stitch 3 4\n", "stitch 1 2 3 1.5\n"}) {
+    try {
+      client::import_mesh("stage.obj", stage(wrong), {});
+      ADD_FAILURE() << wrong;
+    } catch (const Problem& problem) {
+      EXPECT_THAT(problem.what(), AllOf(HasSubstr("stage.obj"), HasSubstr("line "),
+                                        HasSubstr("three points of 0 to 49")));
+    }
+  }
+}
+
 class Garment : public ::testing::Test {
  protected:
   std::string path(const std::string& name) const { return directory_.path(name); }
@@ -211,8 +238,8 @@ TEST_F(Garment, WhatCannotBeSewnIsToldByItsPlaceInTheFile) {
   write_file(path("twice.json"), json.dump());
   const Outcome refused = run_weft({"garment", "build", path("twice.json")});
   EXPECT_EQ(refused.exit, 1);
-  EXPECT_THAT(refused.err, AllOf(HasSubstr("seams[2].first_side[0]: panel front, edge 1"),
-                                 HasSubstr("is sewn twice")));
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("  seams[2].first_side[0]   panel front, edge 1"),
+                                 HasSubstr("is sewn twice: seam 0 has it")));
   EXPECT_THAT(refused.err, Not(HasSubstr("pattern.")));
 }
 

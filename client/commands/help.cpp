@@ -128,7 +128,8 @@ numbers, quantized rounds to 0.1 mm and takes a third to a tenth.
   cut, join        frames of it; recordings of one session together
   replay           serves it as the live session that it was
   export           obj, pc2, mdd, gltf, vtk, usda, csv, for other tools
-  view, render     a page that plays it; pictures
+  view             a page that plays it, small enough to mail
+  render           pictures, and turntables: PNG, WebP
   plot             energy, strain, speed and substeps over time
 )"},
     Topic{"scripting", "Scripts in YAML, and weft in a shell's loops",
@@ -172,6 +173,24 @@ TOKEN) speaks to another, by default that of WEFT_SERVER and its like.
   weft.open(FILE).positions(97)  a frame of a recording
   weft.aio                       the same, to be awaited
   weft.Error                     code, reason, violations (field, description)
+)"},
+    Topic{"blender", "Cloth of Blender's scenes, computed by Weft into a point cache",
+          R"(The add-on is the Debian package blender-weft, or build/release/
+weft_blender.zip for Blender's preferences; it needs the package weft in
+Blender's Python (weft help python). It runs a weftd of its own, or asks one
+that the preferences name.
+
+In the tab Physics, panel Weft, an object is Cloth or Collision. A cloth has a
+fabric of the server, a vertex group that is held, and a flat shape: as it lies,
+or its UV map. Simulate computes from the scene's first frame to its last; one
+may scrub, change the fabric and cancel meanwhile. Gravity, units and frames are
+the scene's, and a force field Wind blows at its strength in m/s.
+
+The modifier Mesh Cache shows the frames. They stay without Weft, in a folder
+beside the file; those of a file that has not been saved are kept by Bake.
+
+  bpy.ops.weft.simulate()        in a script: waits for the last frame
+  weft export --format pc2       frames of a recording, for the same modifier
 )"},
     Topic{"security", "Who may use a server, and how weft shows who it is",
           R"(weftd listens on loopback, unencrypted. Where other machines reach it, it wants

@@ -40,6 +40,10 @@ void check(const RenderOrder& order) {
   if (order.frames.size() > kMostFramesShown)
     throw usage_problem(
         fmt::format("--frame: render shows at most {} frames of a recording", kMostFramesShown));
+  if (order.turntable > 0 && !ends_with_webp(order.path))
+    throw usage_problem("--turntable: it is a WebP file, so -o PATH must end in .webp");
+  if (order.turntable > 0 && order.frames.size() > 1)
+    throw usage_problem("--turntable: it shows one frame of each recording");
   for (const std::string& recording : order.recordings) {
     std::error_code error;  // there is no such file yet
     if (std::filesystem::equivalent(order.path, recording, error))
@@ -55,19 +59,19 @@ void run_render(Context& context, const RenderOptions& options) {
   const RenderResult result = render(
       order, [&](const std::string& doing) { status.show({doing}); }, context.stop);
   status.clear();
-  Json document{{"output", order.path},
-                {"width", result.size.width},
-                {"height", result.size.height},
-                {"frames", result.frames},
-                {"grid_m", result.grid_m}};
+  Json document{{"output", order.path},         {"width", result.size.width},
+                {"height", result.size.height}, {"frames", result.frames},
+                {"views", result.views},        {"grid_m", result.grid_m}};
   std::string colours;
   if (const ColourScale* scale = scale_of(order.colouring)) {
     document[scale->field] = result.most;
     colours = fmt::format(", {} up to {}", scale->name, scale->text(result.most));
   }
   const auto shown = static_cast<std::int64_t>(result.frames.size() * result.frames[0].size());
-  context.answer(document, fmt::format("{}: {} x {} pixels, {}{}\n", order.path, result.size.width,
-                                       result.size.height, count_of(shown, "frame"), colours));
+  const std::string views = result.views > 1 ? fmt::format(", {} views", result.views) : "";
+  context.answer(document,
+                 fmt::format("{}: {} x {} pixels, {}{}{}\n", order.path, result.size.width,
+                             result.size.height, count_of(shown, "frame"), views, colours));
 }
 
 }  // namespace
@@ -85,7 +89,7 @@ void add_render(CLI::App& app, Context& context) {
       ->option_text("...")
       ->required()
       ->expected(-1);
-  command->add_option("-o,--output", order.path, "PNG file to write")
+  command->add_option("-o,--output", order.path, "PNG file to write, or .webp")
       ->type_name("PATH")
       ->required();
   auto* frame = command->add_option("--frame", order.frames, "Frames to show; else the last")
@@ -96,6 +100,14 @@ void add_render(CLI::App& app, Context& context) {
       ->option_text("N")
       ->check(CLI::Range(2, kMostFramesShown))
       ->excludes(frame);
+  command
+      ->add_option("--turntable", order.turntable,
+                   "So many views, once around in 4 s, as a WebP file\nthat browsers play; else 48")
+      ->option_text("[N]")
+      ->expected(0, 1)
+      ->default_str("48")
+      ->check(CLI::Range(2, 360))
+      ->excludes("--contact");
   command
       ->add_option("--colour", order.colouring,
                    "cloth: a front and a back\npanels: a colour for each\n"
@@ -117,7 +129,8 @@ void add_render(CLI::App& app, Context& context) {
       ->check(CLI::Range(-89.0, 89.0));
   command
       ->add_option("--size", options->size,
-                   "Pixels of the picture, each 64 to 8192;\nelse 960x720, or 640x480 a frame")
+                   "Pixels of the picture, each 64 to 8192;\nelse 960x720, 640x480 a frame,\nor "
+                   "480x360 on a turntable")
       ->option_text("WxH");
   command->callback([&context, options] { run_render(context, *options); });
 }

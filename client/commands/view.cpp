@@ -15,6 +15,7 @@ struct ViewOptions {
   std::string frames;
   std::string path;
   std::string title;
+  double most_mb = 8;
 };
 
 constexpr std::size_t kMostShown = 6;
@@ -32,6 +33,7 @@ void check(const ViewOptions& options) {
 void run_view(Context& context, const ViewOptions& options) {
   check(options);
   PageOrder order{.path = options.path, .title = options.title};
+  order.most_bytes = static_cast<std::size_t>(1e6 * options.most_mb);
   order.frames = read_frame_range(options.frames);
   Figure& figure = order.figures.emplace_back();
   for (const std::string& path : options.recordings)
@@ -67,6 +69,11 @@ void add_view(CLI::App& app, Context& context) {
       ->type_name("TEXT");
   command->add_option("--frames", options->frames, "Frames A to B; either may be left out")
       ->option_text("A:B");
+  command
+      ->add_option("--most-mb", options->most_mb,
+                   "Size of the page, kept by less precise positions as far\nas these do; else 8")
+      ->option_text("MB")
+      ->check(CLI::Range(0.1, 1000.0));
   command->callback([&context, options] { run_view(context, *options); });
 }
 

@@ -23,16 +23,19 @@
 
 namespace weft::client {
 
-// viewer.html and live.html with style and scripts in them, and three.js, which both need
+// viewer.html and live.html with style and scripts in them, and what both need of three.js: its
+// license as a comment, its scripts as one
 std::string_view viewer_template();
 std::string_view live_template();
-std::string_view page_libraries();
+std::string_view page_license();
+std::string_view page_library();
 
 namespace {
 
 constexpr std::string_view kPlaceOfRecordings = "<!-- recordings -->";
-constexpr std::string_view kPlaceOfLibraries = "<!-- libraries -->";
+constexpr std::string_view kPlaceOfLicense = "<!-- license -->";
 constexpr double kStepsOfSpacing = 4096;            // quanta in the finest spacing of a recording
+constexpr double kLeastStepsOfSpacing = 128;        // where the page would be too large
 constexpr double kMostSteps = 1 << 30;              // from the origin
 constexpr std::int64_t kMostNumbers = 100'000'000;  // 400 MB in the browser
 
@@ -186,7 +189,33 @@ struct Source {
   std::vector<ClothMesh> cloth;
   Json colliders;
   double quantum_m;
+  std::string frames{};  // packed
 };
+
+// Triangles of all sheets, of particles counted from the first of all.
+std::vector<Triangle> triangles_of(const Source& source) {
+  std::vector<Triangle> triangles;
+  for (std::size_t s = 0; s < source.cloth.size(); ++s) {
+    const std::int32_t first =
+        source.recording.header().sheets(static_cast<int>(s)).first_particle();
+    for (const auto& [a, b, c] : source.cloth[s].triangles)
+      triangles.push_back({a + first, b + first, c + first});
+  }
+  return triangles;
+}
+
+void pack(Source& source) {
+  source.frames.clear();
+  const auto points = [&](std::int64_t number) {
+    return points_of(source.recording, source.recording.read(number));
+  };
+  const std::vector<Guess> guesses = guesses_of(triangles_of(source), points(source.range.first));
+  PackedFrames frames([&](std::string_view text) { source.frames += text; }, guesses,
+                      middle_of(source.summary), source.quantum_m);
+  for (auto number = source.range.first; number <= source.range.last; ++number)
+    frames.add(points(number));
+  frames.finish();
+}
 
 Json recording_json(const Source& source) {
   const RecordingReader& recording = source.recording;
@@ -212,24 +241,48 @@ Json recording_json(const Source& source) {
           {"facts", std::move(facts)}};
 }
 
-// As it may stand in a script element.
-std::string script_text(const Json& json) {
-  const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  std::string safe;
-  for (const char c : text) safe += c == '<' ? std::string("\\u003c") : std::string(1, c);
-  return safe;
+// A page with something in its place.
+std::string with(std::string_view page, std::string_view place, std::string_view text) {
+  const std::size_t at = page.find(place);
+  return std::string(page.substr(0, at)).append(text).append(page.substr(at + place.size()));
 }
 
-std::string with_libraries(std::string_view page) {
-  const std::size_t place = page.find(kPlaceOfLibraries);
-  return std::string(page.substr(0, place))
-      .append(page_libraries())
-      .append(page.substr(place + kPlaceOfLibraries.size()));
+std::string plain_script(std::string_view id, std::string_view text) {
+  return fmt::format("<script type=\"text/plain\" id=\"{}\">{}</script>\n", id, text);
+}
+
+// Packs the frames of all into so many characters, less precisely where that takes it, as far as
+// kLeastStepsOfSpacing.
+void pack_all(std::vector<Source>& sources, std::size_t room,
+              const std::function<void(const Source&)>& progress) {
+  double numbers = 0, coarser = 1;
+  for (const Source& source : sources)
+    numbers += 3.0 * static_cast<double>(source.summary.times_s.size() *
+                                         particles_of(source.recording.header()));
+  for (;;) {
+    std::size_t size = 0;
+    for (Source& source : sources) {
+      progress(source);
+      pack(source);
+      size += source.frames.size();
+    }
+    if (size <= room || coarser >= kStepsOfSpacing / kLeastStepsOfSpacing) return;
+    // half the steps save a bit of each number, which is 1/6 of a character
+    const double halvings = 0.05 + 6 * static_cast<double>(size - room) / numbers;
+    const double by =
+        std::min(std::exp2(halvings), kStepsOfSpacing / kLeastStepsOfSpacing / coarser);
+    coarser *= by;
+    for (Source& source : sources) source.quantum_m *= by;
+  }
 }
 
 }  // namespace
 
-std::string live_page() { return with_libraries(live_template()); }
+std::string live_page() {
+  const std::string library =
+      fmt::format("{}<script>\n{}\n</script>\n", page_license(), page_library());
+  return with(live_template(), kPlaceOfLicense, library);
+}
 
 PageResult write_page(const PageOrder& order,
                       const std::function<void(const std::string& doing)>& progress) {
@@ -247,30 +300,33 @@ PageResult write_page(const PageOrder& order,
         {{"title", figure.title}, {"caption", figure.caption}, {"recordings", std::move(shown)}});
   }
 
-  PageResult result;
-  Json recordings = Json::array();
-  const std::string page = with_libraries(viewer_template());
-  const std::size_t place = page.find(kPlaceOfRecordings);
-  OutputFile file(order.path);
-  file.write(page.substr(0, place));
-  for (Source& source : sources) {
+  const std::string page =
+      with(viewer_template(), kPlaceOfLicense,
+           std::string(page_license()) + plain_script("library", deflated(page_library())));
+  const auto description = [&] {
+    Json recordings = Json::array();
+    for (const Source& source : sources) recordings.push_back(recording_json(source));
+    const Json json{
+        {"title", order.title}, {"figures", figures}, {"recordings", std::move(recordings)}};
+    const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return plain_script("page", deflated(text));
+  };
+  const std::size_t rest = page.size() + description().size();
+  const std::size_t room = order.most_bytes > rest ? order.most_bytes - rest : 0;
+  pack_all(sources, room, [&](const Source& source) {
     progress(fmt::format("{}: {}", order.path, source.recording.path()));
-    file.write(fmt::format("<script type=\"text/plain\" id=\"frames-{}\">", recordings.size()));
-    PackedFrames frames(file, middle_of(source.summary), source.quantum_m);
-    for (auto number = source.range.first; number <= source.range.last; ++number)
-      frames.add(points_of(source.recording, source.recording.read(number)));
-    frames.finish();
-    file.write("</script>\n");
-    recordings.push_back(recording_json(source));
+  });
+
+  PageResult result;
+  std::string recordings = description();
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const Source& source = sources[i];
+    recordings += plain_script(fmt::format("frames-{}", i), source.frames);
     result.frames += source.summary.tally.frames;
     result.largest_error_m = std::max(result.largest_error_m, source.quantum_m / 2);
   }
-  const Json description{{"title", order.title},
-                         {"figures", std::move(figures)},
-                         {"recordings", std::move(recordings)}};
-  file.write("<script type=\"application/json\" id=\"page\">" + script_text(description) +
-             "</script>\n");
-  file.write(page.substr(place + kPlaceOfRecordings.size()));
+  OutputFile file(order.path);
+  file.write(with(page, kPlaceOfRecordings, recordings));
   file.close();
   result.bytes = static_cast<std::int64_t>(std::filesystem::file_size(order.path));
   return result;

@@ -29,7 +29,8 @@ struct PageOrder {
   std::string path;
   std::string title;
   std::vector<Figure> figures{};
-  FrameRange frames{};  // of every recording
+  FrameRange frames{};                 // of every recording
+  std::size_t most_bytes = 8'000'000;  // of the file, as far as less precise positions do
 };
 
 struct PageResult {
@@ -39,8 +40,7 @@ struct PageResult {
 };
 
 // Writes one HTML file that plays recordings: it holds everything it needs and opens without a
-// network. Recordings are read a frame at a time, twice, so memory grows by little with their
-// length.
+// network. Recordings are read a frame at a time, several times; memory holds as much as the file.
 PageResult write_page(const PageOrder& order,
                       const std::function<void(const std::string& doing)>& progress);
 

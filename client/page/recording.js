@@ -1,26 +1,45 @@
 // The recordings that the page holds. Lengths in m, times in s.
 'use strict';
 
-const page = JSON.parse($('page').textContent);
+let page;  // what it says of itself and its recordings
 const kSameTime = 1e-9;
-
-async function inflate(id) {
-  const stream = new Blob([bytesOf($(id).textContent.trim())]).stream().pipeThrough(new DecompressionStream('deflate'));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
 
 // Positions as whole numbers of the quantum: x, y, z of particle 0, of particle 1 ... of every frame.
 // client/page/packed_frames.h says how they are packed.
-function unpack(bytes, frames, values) {
-  const numbers = new Int32Array(frames * values);
+function unpack(bytes, frames, particles) {
+  let at = 0;
+  const take = (count) => {
+    const taken = new Int32Array(count);
+    for (let i = 0; i < count; ++i, ++at) {
+      const zigzag = bytes[at] | (bytes[at + count] << 8) | (bytes[at + 2 * count] << 16) | (bytes[at + 3 * count] << 24);
+      taken[i] = (zigzag >>> 1) ^ -(zigzag & 1);
+    }
+    at += 3 * count;
+    return taken;
+  };
+
+  // of whom each particle's move is guessed, in the order in which they come
+  const order = take(4 * particles);
+  for (let k = 0, particle = 0; k < particles; ++k) {
+    particle += order[k];
+    order[k] = particle;
+    for (const other of [1, 2, 3]) order[other * particles + k] = particle - order[other * particles + k];
+  }
+  const [each, a, b, c] = [0, 1, 2, 3].map((part) => order.subarray(part * particles, (part + 1) * particles));
+
+  const numbers = new Int32Array(frames * 3 * particles);
+  const moves = new Int32Array(particles + 1);  // the last is 0
   for (let frame = 0; frame < frames; ++frame) {
-    const at = 4 * frame * values;
-    const out = frame * values;
-    for (let i = 0; i < values; ++i) {
-      const zigzag = bytes[at + i] | (bytes[at + values + i] << 8) |
-        (bytes[at + 2 * values + i] << 16) | (bytes[at + 3 * values + i] << 24);
-      const before = frame > 0 ? numbers[out - values + i] : 0;
-      numbers[out + i] = before + ((zigzag >>> 1) ^ -(zigzag & 1));
+    const out = 3 * frame * particles;
+    const before = out - 3 * particles;
+    const beyond = take(3 * particles);
+    for (let axis = 0, next = 0; axis < 3; ++axis) {
+      for (let k = 0; k < particles; ++k, ++next) {
+        const move = beyond[next] + moves[a[k]] + moves[b[k]] - moves[c[k]];
+        const i = each[k];
+        moves[i] = move;
+        numbers[out + 3 * i + axis] = (frame > 0 ? numbers[before + 3 * i + axis] : 0) + move;
+      }
     }
   }
   return numbers;

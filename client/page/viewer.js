@@ -4,6 +4,8 @@
 
 class Viewer extends Stage {
   ticks = [0];
+  turning = false;
+  turned = undefined;  // when it last was
 
   async open(figure) {
     this.pause();
@@ -17,6 +19,7 @@ class Viewer extends Stage {
     const times = recordings.flatMap(({time_s}) => time_s).sort((a, b) => a - b);
     this.ticks = times.filter((t, k) => k === 0 || t - times[k - 1] > kSameTime);
     $('scrub').max = this.ticks.length - 1;
+    $('transport').hidden = this.ticks.length < 2;
     showFacts(figure, recordings, this.panes[0].gridCell);
     this.goTo(this.ticks[0]);
   }
@@ -48,7 +51,17 @@ class Viewer extends Stage {
     setPlaying(false);
   }
 
+  turntable(on = !this.turning) {
+    this.turning = on;
+    this.turned = undefined;
+    $('turntable').setAttribute('aria-pressed', on);
+  }
+
   advance(now) {
+    if (this.turning && this.panes.length > 0) {
+      this.turn(this.turned === undefined ? 0 : 2 * Math.PI * (now - this.turned) / 1000 / kTurn, 0);
+      this.turned = now;
+    }
     if (!this.playing) return;
     this.goTo(this.time + (this.last === undefined ? 0 : (now - this.last) / 1000 * Number($('speed').value)));
     this.last = now;
@@ -57,15 +70,55 @@ class Viewer extends Stage {
     }
   }
 
-  drawn() { showTime(this); }
+  drawn() {
+    showTime(this);
+    clearTimeout(this.telling);
+    this.telling = setTimeout(() => this.tell(), 1000 * kQuiet);
+  }
+
+  // Says what is shown, once it has stood still for a while.
+  tell() {
+    if (this.playing || this.turning) return;
+    const frames = [...$('names').children].map(({textContent, lastChild}) =>
+      `${textContent.slice(0, -lastChild.textContent.length)}, ${lastChild.textContent}`);
+    const {front, right} = frontOf(this.up);
+    const from = this.camera.position.clone().sub(this.controls.target).normalize();
+    const degrees = (radians) => Math.round(radians * 180 / Math.PI);
+    const around = degrees(Math.atan2(from.dot(right), from.dot(front)));
+    const above = degrees(Math.asin(from.dot(this.up)));
+    const hand = around > 0 ? 'right' : 'left';
+    const side = around === 0 ? 'the front' : `${Math.abs(around)}° to the ${hand} of the front`;
+    const height = above === 0 ? '' : `, ${Math.abs(above)}° ${above > 0 ? 'above' : 'below'}`;
+    $('shown').textContent = `${this.time.toFixed(3)} s: ${frames.join('; ')}. Seen from ${side}${height}.`;
+  }
+
+  // The view with its background, as a file.
+  async save() {
+    this.draw();
+    const view = $('view');
+    const copy = Object.assign(document.createElement('canvas'), {width: view.width, height: view.height});
+    const drawing = copy.getContext('2d');
+    const background = drawing.createLinearGradient(0, 0, 0, copy.height);
+    background.addColorStop(0, style('--stage-top'));
+    background.addColorStop(1, style('--stage-bottom'));
+    drawing.fillStyle = background;
+    drawing.fillRect(0, 0, copy.width, copy.height);
+    drawing.drawImage(view, 0, 0);
+    const file = URL.createObjectURL(await new Promise((done) => { copy.toBlob(done); }));
+    const name = `${page.title.replace(/[^\p{L}\p{N}_-]+/gu, '-')}-${this.time.toFixed(3)}s.png`;
+    Object.assign(document.createElement('a'), {href: file, download: name}).click();
+    setTimeout(() => URL.revokeObjectURL(file), 60_000);
+  }
 }
+const kTurn = 12;  // s, once around
+const kQuiet = 0.5;  // s
 
 const unpacked = [];
 async function recordingAt(index) {
   if (!unpacked[index]) {
     const facts = page.recordings[index];
     const bytes = await inflate(`frames-${index}`);
-    unpacked[index] = new Recording(facts, unpack(bytes, facts.time_s.length, 3 * facts.particles));
+    unpacked[index] = new Recording(facts, unpack(bytes, facts.time_s.length, facts.particles));
   }
   return unpacked[index];
 }
@@ -159,7 +212,7 @@ function makeFigures(viewer) {
   const choose = async (button, figure) => {
     for (const other of buttons) other.setAttribute('aria-current', other === button);
     await viewer.open(figure);
-    if (!matchMedia('(prefers-reduced-motion: reduce)').matches) viewer.play();
+    if (viewer.ticks.length > 1 && !wanted.has('frame') && !isCalm()) viewer.play();
   };
   $('figures').append(...buttons);
   return choose(buttons[0], page.figures[0]);
@@ -177,23 +230,47 @@ function listen(viewer) {
     viewer.pause();
     viewer.goTo(viewer.ticks[Number($('scrub').value)]);
   });
+  const facts = () => showPanel($('panel').hidden);
+  $('turntable').addEventListener('click', () => viewer.turntable());
+  $('picture').addEventListener('click', () => viewer.save());
+  $('facts-button').addEventListener('click', facts);
   viewer.listen({
+    r: () => viewer.turntable(), p: () => viewer.save(), i: facts,
     ' ': toggle, Home: start, End: end,
     ArrowLeft: (frames) => viewer.step(-frames), ArrowRight: (frames) => viewer.step(frames),
   });
 }
 
+const isFramed = window.self !== window.top;
+function showPanel(shown) {
+  $('panel').hidden = !shown;
+  document.documentElement.classList.toggle('bare', isFramed && !shown);
+  $('facts-button').setAttribute('aria-expanded', shown);
+}
+
+// What the address asks for, behind #: frame=97 to stand there, turn for the turntable, and facts, which with the
+// tools are hidden in the frame of another page.
+const wanted = new URLSearchParams(location.hash.slice(1));
+const isCalm = () => matchMedia('(prefers-reduced-motion: reduce)').matches;
+
+function heed(viewer) {
+  if (wanted.has('frame')) {
+    const [{first_frame, time_s}] = viewer.panes.map(({source}) => source);
+    viewer.goTo(time_s[Math.min(Math.max(Number(wanted.get('frame')) - first_frame, 0), time_s.length - 1)] ?? 0);
+  }
+  viewer.turntable(wanted.has('turn'));
+}
+
 async function main() {
+  page = JSON.parse(await inflateText('page'));
   document.title = page.title;
   $('title').textContent = page.title;
-  if (typeof DecompressionStream === 'undefined') {
-    message('This browser is too old for the page: it lacks DecompressionStream (2023).');
-    return;
-  }
   const viewer = makeStage(Viewer);
   if (!viewer) return;
   listen(viewer);
+  showPanel(wanted.has('facts') || !isFramed);
   await makeFigures(viewer);
+  heed(viewer);
   document.body.dataset.state = 'ready';
   requestAnimationFrame((now) => viewer.tick(now));
 }

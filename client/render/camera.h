@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <limits>
 
 #include "client/render/body.h"
@@ -37,6 +37,16 @@ struct Camera {
   // The direction through a point of the picture, -1 to 1 to the right and upwards.
   Eigen::Vector3d ray(double x, double y) const {
     return (forward + x * tangent_x * right + y * tangent_y * up).normalized();
+  }
+
+  // Led around an axis, and turned with it.
+  Camera turned(const Eigen::AngleAxisd& turn, const Eigen::Vector3d& centre) const {
+    return {centre + turn * (place - centre),
+            turn * forward,
+            turn * right,
+            turn * up,
+            tangent_x,
+            tangent_y};
   }
 };
 

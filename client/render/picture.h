@@ -25,6 +25,8 @@ class Picture {
   // Covers a share of the pixel, 0 to 1. Pixels outside the picture are left out.
   void cover(int x, int y, const Colour& colour, float share);
 
+  const std::uint8_t* bytes() const { return bytes_.data(); }
+
   // The file, as large as the picture at most. Throws std::runtime_error.
   std::string png() const;
 

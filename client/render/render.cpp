@@ -6,19 +6,22 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <numbers>
 
 #include "client/exports/output_file.h"
 #include "client/output/text.h"
 #include "client/problem.h"
 #include "client/render/picture.h"
 #include "client/render/tracer.h"
+#include "client/render/webp.h"
 
 namespace weft::client {
 namespace {
 
 using Eigen::Vector3d;
 
-constexpr Size kAlone{960, 720}, kAmongOthers{640, 480};
+constexpr Size kAlone{960, 720}, kAmongOthers{640, 480}, kTurning{480, 360};
+constexpr int kTurn = 4000;        // once around, ms
 constexpr double kMuchLarger = 4;  // than the cloth: such bodies are not seen as a whole
 const Colour kPaper = colour_of("#ffffff");
 const Colour kInk = colour_of("#23262b");
@@ -87,7 +90,7 @@ Layout lay_out(const RenderOrder& order, int frames) {
   if (order.size) {
     layout.size = *order.size;
   } else {
-    const Size tile = alone ? kAlone : kAmongOthers;
+    const Size tile = order.turntable > 0 ? kTurning : alone ? kAlone : kAmongOthers;
     const double width = tile.width * layout.columns;
     const double height = tile.height * layout.rows;
     const double scale = std::min(1.0, kMostSide / std::max(width, height));
@@ -125,6 +128,21 @@ Margins margins_of(const Layout& layout, float text_size, bool legend, bool name
   return {.top = (names ? 2 : 0.5) * line, .bottom = (legend ? 4.5 : 2.5) * line};
 }
 
+// Of the camera, around what is shown: it is seen from ever further to its right.
+Eigen::AngleAxisd turn_of(int view, const RenderOrder& order, const Vector3d& up) {
+  return {2 * std::numbers::pi * view / std::max(1, order.turntable), up};
+}
+
+// The light goes along with the camera, as if what is seen were turned.
+Survey turned(const Survey& survey, const Eigen::AngleAxisd& turn) {
+  Survey seen = survey;
+  seen.camera = survey.camera.turned(turn, survey.studio.centre);
+  Directions& directions = seen.studio.directions;
+  directions.near = turn * directions.near;
+  directions.right = turn * directions.right;
+  return seen;
+}
+
 Survey survey_of(std::vector<RecordingReader>& recordings,
                  const std::vector<std::vector<std::int64_t>>& frames, const RenderOrder& order,
                  const Layout& layout, const Margins& margins, const std::stop_token& stop) {
@@ -137,8 +155,9 @@ Survey survey_of(std::vector<RecordingReader>& recordings,
   CameraFit fit(studio.directions, order.outlook,
                 static_cast<double>(layout.tile_width()) / layout.tile_height(), margins);
   Extent extent;
+  std::vector<Ball> shown;
   const auto show = [&](const Ball& ball) {
-    fit.add(ball);
+    shown.push_back(ball);
     extent.add(ball, studio.directions.up);
   };
 
@@ -169,6 +188,13 @@ Survey survey_of(std::vector<RecordingReader>& recordings,
   studio.radius = std::max(size / 2, 1e-9);
   studio.grid = std::pow(10, std::floor(std::log10(studio.radius / 2)));
   studio.ground = {(extent.lowest - 0.02 * size) * studio.directions.up, studio.directions.up};
+  // what turns needs room wherever it comes
+  for (int view = 0; view < std::max(1, order.turntable); ++view) {
+    const Eigen::AngleAxisd turn = turn_of(view, order, studio.directions.up);
+    for (const Ball& ball : shown)
+      fit.add(view == 0 ? ball
+                        : Ball{studio.centre + turn * (ball.centre - studio.centre), ball.radius});
+  }
   survey.camera = fit.camera();
   return survey;
 }
@@ -200,6 +226,10 @@ void draw_legend(Picture& picture, const ColourScale& scale, double largest, con
 }
 
 }  // namespace
+
+bool ends_with_webp(const std::string& path) {
+  return std::filesystem::path(path).extension() == ".webp";
+}
 
 const ColourScale* scale_of(Colouring colouring) {
   static constexpr ColourScale kStrain{"strain", "strain, largest at a particle", "largest_strain",
@@ -251,39 +281,55 @@ RenderResult render(const RenderOrder& order,
   const Survey survey = survey_of(recordings, result.frames, order, layout,
                                   margins_of(layout, text, legend != nullptr, names), stop);
 
+  result.views = std::max(1, order.turntable);
   Picture picture(layout.size.width, layout.size.height);
-  for (int y = 0; y < picture.height(); ++y)
-    for (int x = 0; x < picture.width(); ++x) picture.cover(x, y, kPaper, 1);
   const int gap = layout.columns * layout.rows == 1 ? 0 : std::max(1, layout.tile_width() / 400);
-  int place = 0;
-  Area area;
-  for (std::size_t i = 0; i < recordings.size(); ++i) {
-    for (const std::int64_t number : result.frames[i]) {
-      progress(fmt::format("{}: {} of {}", order.path, place + 1,
-                           recordings.size() * result.frames[i].size()));
-      area = {place % layout.columns * layout.size.width / layout.columns + gap,
-              place / layout.columns * layout.size.height / layout.rows + gap,
-              layout.tile_width() - 2 * gap, layout.tile_height() - 2 * gap};
-      const Stage stage = read_stage(recordings[i], number, order.colouring);
-      Tracer(stage, survey.studio).draw(survey.camera, picture, area, stop);
-      const float left = static_cast<float>(area.x) + text;
-      const float width = static_cast<float>(area.width) - 2 * text;
-      if (names) {
-        write_within(picture, std::filesystem::path(order.recordings[i]).stem().string(),
-                     1.25F * text, left, static_cast<float>(area.y) + 2 * text, width, kInk);
+  const int tiles = static_cast<int>(recordings.size() * result.frames.front().size());
+  const auto draw = [&](const Survey& seen, int drawn) {
+    for (int y = 0; y < picture.height(); ++y)
+      for (int x = 0; x < picture.width(); ++x) picture.cover(x, y, kPaper, 1);
+    int place = 0;
+    Area area;
+    for (std::size_t i = 0; i < recordings.size(); ++i) {
+      for (const std::int64_t number : result.frames[i]) {
+        progress(fmt::format("{}: {} of {}", order.path, drawn + place + 1, tiles * result.views));
+        area = {place % layout.columns * layout.size.width / layout.columns + gap,
+                place / layout.columns * layout.size.height / layout.rows + gap,
+                layout.tile_width() - 2 * gap, layout.tile_height() - 2 * gap};
+        const Stage stage = read_stage(recordings[i], number, order.colouring);
+        Tracer(stage, seen.studio).draw(seen.camera, picture, area, stop);
+        const float left = static_cast<float>(area.x) + text;
+        const float width = static_cast<float>(area.width) - 2 * text;
+        if (names) {
+          write_within(picture, std::filesystem::path(order.recordings[i]).stem().string(),
+                       1.25F * text, left, static_cast<float>(area.y) + 2 * text, width, kInk);
+        }
+        write_within(picture,
+                     fmt::format("frame {}, {}, grid {} m", number, seconds_text(stage.time_s),
+                                 number_text(seen.studio.grid)),
+                     text, left, static_cast<float>(area.y + area.height) - text,
+                     legend != nullptr ? width / 2.5F : width, kQuietInk);
+        ++place;
       }
-      write_within(picture,
-                   fmt::format("frame {}, {}, grid {} m", number, seconds_text(stage.time_s),
-                               number_text(survey.studio.grid)),
-                   text, left, static_cast<float>(area.y + area.height) - text,
-                   legend != nullptr ? width / 2.5F : width, kQuietInk);
-      ++place;
     }
+    if (legend != nullptr) draw_legend(picture, *legend, seen.studio.most, area, text);
+  };
+
+  std::string bytes;
+  if (order.turntable > 0) {
+    WebpAnimation animation(picture.width(), picture.height(), kTurn / order.turntable);
+    for (int view = 0; view < order.turntable; ++view) {
+      draw(turned(survey, turn_of(view, order, survey.studio.directions.up)), tiles * view);
+      animation.add(picture);
+    }
+    bytes = animation.finish();
+  } else {
+    draw(survey, 0);
+    bytes = ends_with_webp(order.path) ? webp(picture) : picture.png();
   }
-  if (legend != nullptr) draw_legend(picture, *legend, survey.studio.most, area, text);
 
   OutputFile file(order.path);
-  file.write(picture.png());
+  file.write(bytes);
   file.close();
   result.size = layout.size;
   result.most = survey.studio.most;

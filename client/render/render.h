@@ -26,7 +26,8 @@ struct RenderOrder {
   std::string path;
   std::vector<std::string> recordings;
   std::vector<std::int64_t> frames;  // none: the last
-  int contact = 0;  // instead, so many from first to last; what ended earlier shows its last
+  int contact = 0;    // instead, so many from first to last; what ended earlier shows its last
+  int turntable = 0;  // so many views, once around, of one frame each, as an animation
   std::optional<Size> size;
   Outlook outlook;
   Colouring colouring = Colouring::kCloth;
@@ -46,12 +47,16 @@ const ColourScale* scale_of(Colouring colouring);
 struct RenderResult {
   Size size;
   std::vector<std::vector<std::int64_t>> frames;  // of each recording
-  double most = 0;                                // of the colouring
-  double grid_m = 0;                              // cells on the ground
+  int views = 1;
+  double most = 0;    // of the colouring
+  double grid_m = 0;  // cells on the ground
 };
 
-// Writes the picture as a PNG; equal recordings give equal bytes on one machine. Holds a frame at a
-// time, and the picture twice: 400 MB at most, beside a frame.
+bool ends_with_webp(const std::string& path);
+
+// Writes the picture as a PNG, or as WebP where the path ends so, as an animation does; equal
+// recordings give equal bytes on one machine. Holds a frame at a time, and the picture twice: 400
+// MB at most, beside a frame.
 RenderResult render(const RenderOrder& order,
                     const std::function<void(const std::string& doing)>& progress,
                     const std::stop_token& stop);

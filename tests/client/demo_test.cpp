@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "tests/client/client_test.h"
+#include "tests/client/page_content.h"
 
 namespace weft::testing {
 namespace {
@@ -24,7 +25,7 @@ TEST_F(DemoTest, EndsWithTheExperimentsTheSpeedOfEachLawAndOnePageOfAll) {
     EXPECT_GT(speed[law]["times_series"], 0);
     EXPECT_GT(speed[law]["rms_from_exact_m"], 0);
   }
-  const std::string page = read_file(result["page"].get<std::string>());
+  const std::string page = description(read_file(result["page"].get<std::string>())).dump();
   EXPECT_THAT(page, HasSubstr(R"("title":"Speed")"));
   EXPECT_THAT(page, HasSubstr(R"({"group":"Measured","rows":[["time",)"));
   EXPECT_THAT(page, HasSubstr(R"(["against series","1.00 x"])"));

@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <png.h>
+#include <webp/demux.h>
 
 #include <algorithm>
 #include <cmath>
@@ -36,6 +37,13 @@ class Image {
         << image_.message;
   }
 
+  Image(int width, int height, const std::uint8_t* rgba) {
+    image_.width = static_cast<png_uint_32>(width);
+    image_.height = static_cast<png_uint_32>(height);
+    for (int i = 0; i < 4 * width * height; ++i)
+      if (i % 4 != 3) bytes_.push_back(rgba[i]);
+  }
+
   int width() const { return static_cast<int>(image_.width); }
   int height() const { return static_cast<int>(image_.height); }
   Rgb at(int x, int y) const {
@@ -47,6 +55,26 @@ class Image {
   png_image image_{};
   std::vector<unsigned char> bytes_;
 };
+
+// The pictures of a WebP file as libwebp shows them, and when each ends, ms.
+std::vector<std::pair<Image, int>> animation(const std::string& file) {
+  const WebPData data{reinterpret_cast<const std::uint8_t*>(file.data()), file.size()};
+  WebPAnimDecoder* decoder = WebPAnimDecoderNew(&data, nullptr);
+  EXPECT_NE(decoder, nullptr);
+  WebPAnimInfo info;
+  WebPAnimDecoderGetInfo(decoder, &info);
+  std::vector<std::pair<Image, int>> pictures;
+  while (WebPAnimDecoderHasMoreFrames(decoder) != 0) {
+    std::uint8_t* rgba = nullptr;
+    int end = 0;
+    WebPAnimDecoderGetNext(decoder, &rgba, &end);
+    pictures.emplace_back(
+        Image(static_cast<int>(info.canvas_width), static_cast<int>(info.canvas_height), rgba),
+        end);
+  }
+  WebPAnimDecoderDelete(decoder);
+  return pictures;
+}
 
 // Where the front of cloth is seen, pixels.
 struct Seen {
@@ -136,6 +164,37 @@ TEST_F(RenderTest, ShowsASheetInItsShapeWithinThePicture) {
   const Image back = render({square, "--azimuth", "180", "--size", "100x80"});
   EXPECT_EQ(find_front(back, 0, 100).pixels, 0);
   EXPECT_GT(back.at(50, 35).colour(), 30);
+}
+
+TEST_F(RenderTest, ATurntableGoesOnceAroundAtOneSize) {
+  const std::string square = record(standing_square(), "square");
+  const std::string file = path("square.webp");
+  const auto answer = ask({"render", square, "--turntable", "8", "--azimuth", "0", "--elevation",
+                           "0", "--size", "128x96", "-o", file});
+  EXPECT_EQ(answer["views"], 8);
+  const auto pictures = animation(read_file(file));
+  ASSERT_EQ(pictures.size(), 8);
+  EXPECT_EQ(pictures.back().second, 4000);
+  std::vector<int> widths;
+  for (const auto& [image, end] : pictures) widths.push_back(find_front(image, 0, 128).width());
+  // ahead, from its right, and so on; the back half shows no front
+  EXPECT_NEAR(widths[1] / static_cast<double>(widths[0]), std::sqrt(0.5), 0.12);
+  EXPECT_NEAR(widths[7], widths[1], 3);
+  for (const std::size_t behind : {3U, 4U, 5U})
+    EXPECT_EQ(find_front(pictures[behind].first, 0, 128).pixels, 0);
+  EXPECT_GT(pictures[4].first.at(64, 40).colour(), 30);
+}
+
+TEST_F(RenderTest, APictureMayBeWebP) {
+  const std::string square = record(standing_square(), "square");
+  const std::string file = path("square.webp");
+  ask({"render", square, "--size", "100x80", "-o", file});
+  const Seen png = find_front(render({square, "--size", "100x80"}), 0, 100);
+  const auto pictures = animation(read_file(file));
+  ASSERT_EQ(pictures.size(), 1);
+  const Seen seen = find_front(pictures[0].first, 0, 100);
+  EXPECT_NEAR(seen.pixels, png.pixels, png.pixels / 20);
+  EXPECT_NEAR(seen.width(), png.width(), 2);
 }
 
 TEST_F(RenderTest, BodiesOfTrianglesAreSeenWhereTheyStand) {
@@ -373,6 +432,10 @@ TEST_F(RenderTest, SaysWhatIsWrong) {
   EXPECT_THAT(refused({"--size", "64x64", "-o", path("no/x.png")}, 4),
               HasSubstr("cannot write " + path("no/x.png") + ": No such file or directory"));
   EXPECT_THAT(refused({"-o", square}, 4), HasSubstr("it is the recording itself"));
+  EXPECT_THAT(refused({"--turntable", "-o", png_}, 2), HasSubstr("-o PATH must end in .webp"));
+  EXPECT_THAT(refused({"--turntable", "--frame", "1,2", "-o", path("x.webp")}, 2),
+              HasSubstr("shows one frame of each recording"));
+  EXPECT_THAT(refused({"--turntable", "1", "-o", path("x.webp")}, 2), HasSubstr("2"));
   EXPECT_FALSE(std::filesystem::exists(png_));
 }
 

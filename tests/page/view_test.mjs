@@ -1,7 +1,8 @@
 // The page of `weft view` in Chromium, by what a person does; ./dev test-page runs it.
 import assert from 'node:assert/strict';
-import {statSync, writeFileSync} from 'node:fs';
-import {pathToFileURL} from 'node:url';
+import {readFileSync, statSync, writeFileSync} from 'node:fs';
+import {join} from 'node:path';
+import {fileURLToPath, pathToFileURL} from 'node:url';
 import {before, test} from 'node:test';
 import {canvas, file, open as openUrl, picture, plain, settle, weft} from './browser.mjs';
 import {sewn} from './sewn.mjs';
@@ -19,8 +20,8 @@ before(() => {
 });
 
 // The page from disk, without a network, standing at its first frame.
-async function open(name, options = {}) {
-  const {page, problems, context} = await openUrl(pathToFileURL(file(name)).href,
+async function open(name, {hash = '', ...options} = {}) {
+  const {page, problems, context} = await openUrl(pathToFileURL(file(name)).href + hash,
     {reducedMotion: 'reduce', offline: true, asks: (url) => url.startsWith('file:'), ...options});
   await page.waitForSelector('body[data-state=ready]');
   await settle(page);
@@ -135,16 +136,116 @@ test('on a phone everything fits the width, and a finger turns the view', async 
   await close();
 });
 
-test('ten seconds of 31 x 31 at 60 frames a second take less than 5 MB', async () => {
+test('ten seconds of 31 x 31 at 60 frames a second take less than 4 MB', async () => {
   weft('scene', 'new', '--template', 'flag', '--rows', '31', '-o', file('flag.json'));
   weft('record', file('flag.json'), '--embedded', '--to', '599', '-o', file('flag.weft'));
   weft('view', file('flag.weft'), '-o', file('flag.html'));
-  assert.ok(statSync(file('flag.html')).size < 5e6, `${statSync(file('flag.html')).size} bytes`);
+  assert.ok(statSync(file('flag.html')).size < 4e6, `${statSync(file('flag.html')).size} bytes`);
   const {page, close} = await open('flag.html');
   await page.keyboard.press('End');
   await settle(page);
   await picture(page, 'flag');
   await close();
+});
+
+test('200 frames of 15 000 particles take less than 8 MB, and less where that is asked', async () => {
+  weft('scene', 'new', '--template', 'sphere', '--rows', '123', '--columns', '122', '--textile', 'wool_tropical',
+    '--accuracy', 'draft', '--set', 'solver.max_self_weight_strain=0.1', '-o', file('large.json'));
+  weft('record', file('large.json'), '--embedded', '--to', '199', '-o', file('large.weft'));
+  const written = (...words) => JSON.parse(weft('view', file('large.weft'), '-o', file('large.html'), '--json', ...words));
+  const whole = written();
+  assert.ok(whole.bytes < 8e6, `${whole.bytes} bytes`);
+  const small = written('--most-mb', '3');
+  assert.ok(small.bytes < 3e6, `${small.bytes} bytes`);
+  assert.ok(small.largest_error_m > whole.largest_error_m);
+  const {page, close} = await open('large.html');
+  await page.keyboard.press('End');
+  await settle(page);
+  await picture(page, 'large');
+  await close();
+});
+
+test('a turntable turns by itself until it is stopped', async () => {
+  const {page, close} = await open('one.html', {hash: '#frame=40&turn', viewport: {width: 480, height: 360}});
+  assert.equal(await clock(page), '4.000 / 4.000 s');
+  const turntable = page.getByRole('button', {name: 'Turntable'});
+  assert.equal(await turntable.getAttribute('aria-pressed'), 'true');
+  const before = await canvas(page);
+  await settle(page);
+  assert.notEqual(await canvas(page), before);
+  await page.keyboard.press('r');
+  assert.equal(await turntable.getAttribute('aria-pressed'), 'false');
+  await settle(page);
+  const stopped = await canvas(page);
+  await settle(page);
+  assert.equal(await canvas(page), stopped);
+  await close();
+});
+
+test('a page of one frame is a still without playback', async () => {
+  weft('view', file('stiff.weft'), '--frames', '40:40', '-o', file('still.html'));
+  const {page, close} = await open('still.html');
+  assert.equal(await page.locator('#transport').isVisible(), false);
+  await picture(page, 'still');
+  await close();
+});
+
+test('what is shown can be saved as a picture', async () => {
+  const {page, close} = await open('one.html', {hash: '#frame=40'});
+  const [saved] = await Promise.all([page.waitForEvent('download'), page.keyboard.press('p')]);
+  assert.equal(saved.suggestedFilename(), 'stiff-4.000s.png');
+  await saved.saveAs(join(process.env.PICTURES, 'saved.png'));
+  const {width, height} = await page.locator('#view').boundingBox();
+  const header = readFileSync(join(process.env.PICTURES, 'saved.png')).subarray(16, 24);
+  assert.deepEqual([header.readUInt32BE(0), header.readUInt32BE(4)], [Math.round(width), Math.round(height)]);
+  await close();
+});
+
+test('in the frame of another page there is the cloth, and facts are a key away', async () => {
+  writeFileSync(file('around.html'),
+    '<iframe src="one.html" sandbox="allow-scripts" title="A drape" width="480" height="360"></iframe>');
+  const {page, close} = await openUrl(pathToFileURL(file('around.html')).href, {asks: (url) => url.startsWith('file:')})
+    .then(({page, problems, context}) => ({page, close: async () => { await context.close(); assert.deepEqual(problems, []); }}));
+  const inside = page.frameLocator('iframe');
+  await inside.locator('body[data-state=ready]').waitFor();
+  assert.equal(await inside.locator('#panel').isVisible(), false);
+  const {height} = await inside.locator('#stage').boundingBox();
+  assert.ok(height > 260, `${height} pixels of 360`);
+  await picture(page, 'framed');
+  await inside.getByRole('button', {name: 'Facts'}).click();
+  assert.equal(await inside.locator('#panel').isVisible(), true);
+  await close();
+});
+
+test('who cannot see it hears what is shown, and reaches everything by keys', async () => {
+  const {page, close} = await open('one.html', {hash: '#frame=40'});
+  const shown = page.locator('#shown');
+  await page.waitForFunction(() => document.getElementById('shown').textContent);
+  assert.match(plain(await shown.textContent()),
+    /^4\.000 s: stiff, frame 40, strain up to [0-9.]+ %\. Seen from 29° to the right of the front, 22° above\.$/);
+  await page.keyboard.press('ArrowLeft');
+  await page.waitForFunction(() => document.getElementById('shown').textContent.startsWith('3.900 s'));
+  const reached = new Set();
+  for (let k = 0; k < 40; ++k) {
+    await page.keyboard.press('Tab');
+    reached.add(await page.evaluate(() => document.activeElement.id));
+  }
+  for (const id of ['view', 'colour', 'lines', 'turntable', 'picture', 'facts-button', 'play', 'scrub', 'speed', 'repeat']) {
+    assert.ok(reached.has(id), id);
+  }
+  await close();
+});
+
+test('no rule of accessibility is broken, in light and dark, wide and narrow', async () => {
+  for (const options of [{}, {colorScheme: 'dark'}, {viewport: {width: 390, height: 844}}]) {
+    const {page, close} = await open('pair.html', options);
+    await page.locator('#colour').selectOption('strain');
+    await settle(page);
+    await page.addScriptTag({content: readFileSync(fileURLToPath(import.meta.resolve('axe-core')), 'utf8')});
+    const {violations} = await page.evaluate(() => axe.run());
+    assert.deepEqual(violations.map(({id, nodes}) => `${id}: ${nodes.map(({html}) => html).join(' ')}`), []);
+    await close();
+  }
 });
 
 const kSewn = {particles: 676, triangles: 1250};

@@ -83,7 +83,7 @@ bounds, and what it is when it is absent):
 
 A field that does not exist is an error with its line. NaN is refused.
 )"},
-    Topic{"garments", "Patterns, what they hold, and how they become sheets",
+    Topic{"garments", "Patterns, how they become sheets, and how these are put on",
           R"(A pattern file is the protobuf JSON of weft.v1.Pattern: panels and seams, in m.
 A panel is a piece as it is cut:
   name       what seams call it
@@ -101,15 +101,26 @@ The second side runs against the first, as panels with the same side outward
 do; same_direction turns one of them over. Of sides of two lengths the longer
 one is gathered evenly. A dart is a notch whose sides are sewn.
 
+  weft drape tshirt --size 40 -o tshirt.glb           put on, until it hangs
   weft garment new tshirt --size 40 -o tshirt.json    by the tape, or by size
   weft garment import pattern.json -o mine.json       of GarmentCode
   weft garment build mine.json                        what is noteworthy
   weft garment build mine.json --body form.obj -o scene.json
 
 Both sides of a seam get equal numbers of particles, which are one from the
-start: triangles along seams begin stretched until the cloth draws them
-together. Inside, triangles are equilateral and lie along the grain; a panel
-that is symmetric about u = constant has symmetric ones.
+start, between both panels: triangles along seams begin stretched. Inside,
+triangles are equilateral and lie along the grain; a panel that is symmetric
+about u = constant has symmetric ones.
+
+Scenes of garments have a dressing (proto/weft/v1/scene.proto): first seams
+close, without weight, from a start without strain; edges labelled "waist" keep
+their height; then weight comes in. Whether a drape is good is its verdict:
+  NOT_DRESSED  seams still close, or something is held
+  NOT_AT_REST  the cloth still moves
+  CLOTH_CUTS   edges pass through cloth
+  INSIDE_BODY  particles are inside a body
+  SLID_DOWN    what was held has come down by more than 30 mm
+  TOO_TIGHT    1 of 100 triangles is strained by more than 10 %
 )"},
     Topic{"recordings", "Files that hold frames, and what can be done with them",
           R"(A recording holds frames of a session as they were streamed, to the bit, with

@@ -24,7 +24,8 @@ using boost::system::error_code;
 constexpr int kMostConnections = 64;
 constexpr std::size_t kMostBytes = 64 * 1024;  // of a request or message
 constexpr std::uint32_t kMostHeaderBytes = 16 * 1024;
-constexpr std::chrono::seconds kPatience{30};  // with a browser that is silent or does not read
+constexpr std::chrono::seconds kBrowserPatience{
+    30};  // with a browser that is silent or does not read
 
 // No script from elsewhere, no frame around the page, no guesses at types.
 constexpr const char* kPolicy =
@@ -68,7 +69,7 @@ class Peer : public std::enable_shared_from_this<Peer> {
     parser_.emplace();
     parser_->header_limit(kMostHeaderBytes);
     parser_->body_limit(kMostBytes);
-    stream_.expires_after(kPatience);
+    stream_.expires_after(kBrowserPatience);
     http::async_read(
         stream_, buffer_, *parser_,
         [self = shared_from_this()](error_code error, std::size_t) { self->on_read(error); });
@@ -106,7 +107,7 @@ class Peer : public std::enable_shared_from_this<Peer> {
     if (is_page) response_.set("Content-Security-Policy", kPolicy);
     response_.keep_alive(keep_alive);
     response_.prepare_payload();
-    stream_.expires_after(kPatience);
+    stream_.expires_after(kBrowserPatience);
     http::async_write(stream_, response_,
                       [self = shared_from_this()](error_code error, std::size_t) {
                         if (!error && self->response_.keep_alive()) return self->read();

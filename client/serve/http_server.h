@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>  // which Boost.Asio needs, and does not include
 
 namespace weft::client {
 

@@ -1,0 +1,112 @@
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+#include "client/garments/pattern_file.h"
+#include "tests/client/client_test.h"
+
+namespace weft::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr double kPole = 0.1;  // radius of what is dressed, m
+
+// A closed pole about y, from -1 to 1 m.
+std::string pole_obj() {
+  constexpr int kSides = 48;
+  std::ostringstream text;
+  for (const double y : {-1.0, 1.0}) {
+    text << "v 0 " << y << " 0\n";
+    for (int k = 0; k < kSides; ++k) {
+      const double angle = 2 * std::numbers::pi * k / kSides;
+      text << "v " << kPole * std::cos(angle) << ' ' << y << ' ' << kPole * std::sin(angle) << '\n';
+    }
+  }
+  for (int k = 0; k < kSides; ++k) {
+    const int low = 2 + k, next = 2 + (k + 1) % kSides, up = kSides + 1;
+    text << "f 1 " << low << ' ' << next << '\n'
+         << "f " << 1 + up << ' ' << next + up << ' ' << low + up << '\n'
+         << "f " << low << ' ' << low + up << ' ' << next << '\n'
+         << "f " << next << ' ' << low + up << ' ' << next + up << '\n';
+  }
+  return text.str();
+}
+
+// Two rectangles in front of the pole and behind it, sewn at their sides, with a waist on top.
+v1::Pattern tube_pattern(double girth) {
+  v1::Pattern pattern;
+  const double half = girth / 4;
+  for (const bool back : {false, true}) {
+    v1::PatternPanel* panel = pattern.add_panels();
+    panel->set_name(back ? "back" : "front");
+    const auto edge = [&](double u, double v, const char* label = "") {
+      v1::PatternEdge* added = panel->add_edges();
+      added->add_points_m(u);
+      added->add_points_m(v);
+      added->set_label(label);
+    };
+    edge(half, 0);
+    edge(half, 0.2);
+    edge(-half, 0.2, "waist");
+    edge(-half, 0);
+    panel->mutable_placement()->mutable_origin_m()->set_z(back ? -0.15 : 0.15);
+    if (back) {
+      panel->mutable_placement()->mutable_rotation()->set_w(0);
+      panel->mutable_placement()->mutable_rotation()->set_y(1);
+    }
+  }
+  for (const auto& [front, back] : {std::pair(1, 3), std::pair(3, 1)}) {
+    v1::PatternSeam* seam = pattern.add_seams();
+    seam->add_first_side()->set_panel("front");
+    seam->mutable_first_side(0)->set_edge(front);
+    seam->add_second_side()->set_panel("back");
+    seam->mutable_second_side(0)->set_edge(back);
+  }
+  return pattern;
+}
+
+class Drape : public ClientTest {
+ protected:
+  Outcome drape(double girth, std::vector<std::string> options) {
+    write_file(path("pole.obj"), pole_obj());
+    write_file(path("tube.json"), client::pattern_text(tube_pattern(girth)));
+    std::vector<std::string> arguments{"drape",          path("tube.json"), "--body",
+                                       path("pole.obj"), "--edge",          "0.03"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return run_weft(arguments);
+  }
+};
+
+TEST_F(Drape, OfWhatFitsIsGoodAndIsWritten) {
+  const Outcome outcome = drape(0.62, {"-o", path("tube.glb"), "--page", path("tube.html"),
+                                       "--recording", path("tube.weft"), "--json"});
+  ASSERT_EQ(outcome.exit, 0) << outcome.err;
+  const nlohmann::json verdict = outcome.json()["verdict"];
+  EXPECT_EQ(verdict["good"], true);
+  EXPECT_EQ(verdict["at_rest"], true);
+  // around a polygon that keeps a skin of 3 mm from the pole
+  const double girth = 2 * std::numbers::pi * (kPole + 0.003);
+  EXPECT_NEAR(verdict["strain_weft"].get<double>(), girth / 0.62 - 1, 0.02);
+  EXPECT_GT(verdict["largest_pressure_pa"].get<double>(), 0);
+  for (const char* file : {"tube.glb", "tube.html", "tube.weft"})
+    EXPECT_TRUE(std::filesystem::exists(path(file))) << file;
+}
+
+TEST_F(Drape, OfWhatIsTooWideSlidesDownAndIsNotGood) {
+  const Outcome outcome = drape(0.8, {"--seconds", "2"});
+  EXPECT_EQ(outcome.exit, 1);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("not a good drape"), HasSubstr("SLID_DOWN")));
+  EXPECT_THAT(outcome.out, HasSubstr("verdict   not good"));
+}
+
+TEST_F(Drape, ReplacesAFileOnlyWhenAsked) {
+  write_file(path("tube.glb"), "mine");
+  EXPECT_EQ(drape(0.62, {"-o", path("tube.glb")}).exit, 4);
+  EXPECT_EQ(read_file(path("tube.glb")), "mine");
+  EXPECT_EQ(drape(0.62, {"-o", path("tube.png")}).exit, 2);
+}
+
+}  // namespace
+}  // namespace weft::testing

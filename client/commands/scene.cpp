@@ -156,8 +156,10 @@ A mesh becomes a sheet of triangles: its flat shape is its UV, a panel is a
 group (g) of an OBJ file where it has several, else a material (usemtl), else an
 object (o); of glTF a primitive. Polygons are cut into triangles. What was found
 is said: panels, borders, seams, scale, the triangles that keep the step short.
-Top is +y and right +x, as seen from the front. What cannot be simulated is
-refused with its place in the file.
+Top is +y and right +x, as seen from the front. Lines of C-IPC, "stitch POINT A B
+SHARE" in an OBJ file, sew a point to the nearer of two, in the mean of their
+places; without UV the flat shape is then the planes of the pieces. What cannot
+be simulated is refused with its place in the file.
   weft scene new --mesh shirt.obj --pin border:top -o shirt.json
   weft scene new --mesh dress.glb --mend --textile jersey_interlock \
       --panel-textile belt=denim_11oz --body figure.obj -o dress.json

@@ -45,7 +45,7 @@ def person():
         bpy.ops.object.shade_smooth()
         scarf.location[2] = 0.35
     scene = bpy.context.scene
-    scene.frame_end = 120
+    scene.frame_end = 240
     area("PROPERTIES").spaces[0].context = "PHYSICS"
     view = area("VIEW_3D").spaces[0].region_3d
     view.view_distance, view.view_location = 2.2, (0, 0, 0)
@@ -66,9 +66,9 @@ def person():
         yield 0.1
     yield 0.5
     run = work.simulation.run
-    assert run.refused is None and run.newest == 119, run.refused
+    assert run.refused is None and run.newest == 239, run.refused
     assert "denim" not in str(run.troubles())
-    scene.frame_set(120)
+    scene.frame_set(240)
     assert look(scarf)[:, 2].min() < -0.05
     yield 0.5
     picture("drape")
@@ -81,9 +81,9 @@ def person():
         assert bpy.ops.weft.cancel() == {"FINISHED"}
     while work.running():
         yield 0.05
-    assert time.monotonic() - begun < 5
+    assert time.monotonic() - begun < 20
     yield 0.5
-    assert run is not work.simulation.run and 10 <= work.simulation.run.newest < 119
+    assert run is not work.simulation.run and 10 <= work.simulation.run.newest < 239
 
     hollow = bpy.data.objects["Ball"]
     scene.frame_set(1)

@@ -197,6 +197,10 @@ int run_weft(std::vector<std::string> arguments, const Terminal& terminal,
     return report(surplus(app, app.remaining(true).front()), context);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, terminal.out, terminal.err);
+    // what stands before a word that a command is called
+    if (const auto left = app.remaining(); !left.empty() && !left.front().starts_with('-'))
+      return report(usage_problem("weft has no command " + left.front() + "; see weft --help"),
+                    context);
     return report(usage_problem(std::string(error.what()) + "; see --help"), context);
   } catch (const Problem& problem) {
     return report(as_given(app, problem), context);

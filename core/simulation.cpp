@@ -424,6 +424,13 @@ void Simulation::copy_velocities(std::span<double> out) const {
   }
 }
 
+VectorXd Simulation::pressures(std::size_t sheet) const {
+  state_->restore_memory();
+  const MovingSheet& moving = state_->sheets[sheet];
+  return weft::pressures(state_->scene, state_->scene.sheets[sheet], moving, moving.good().x,
+                         time());
+}
+
 Verdict Simulation::verdict() const {
   state_->restore_memory();
   return judge(state_->scene, state_->sheets, time(), at_rest());

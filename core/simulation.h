@@ -86,6 +86,8 @@ class Simulation {
   FrameStats stats() const;
   // How the sheets sit, which takes about as long as some substeps.
   Verdict verdict() const;
+  // What colliders press each particle of a sheet with, Pa, see core/verdict.h.
+  VectorXd pressures(std::size_t sheet) const;
 
   // Changes the textile of a sheet between frames: positions and velocities stay, the step is
   // planned anew. Over `duration`, s, the textile changes with every frame, from what it is now, in

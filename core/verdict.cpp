@@ -108,7 +108,7 @@ void find_faults(const Scene& scene, Verdict& verdict) {
           join("what was held has come down by ", 1000 * verdict.slid, " mm, more than ",
                1000 * kMostSlid, " mm: it is too wide there, or too smooth"));
   if (const double strain = std::max(verdict.strain_warp, verdict.strain_weft);
-      strain > kMostStrain99)
+      verdict.dressed && strain > kMostStrain99)
     fault("TOO_TIGHT", join("1 % of the triangles are strained by ", 100 * strain, " %, more than ",
                             100 * kMostStrain99, " %"));
 }

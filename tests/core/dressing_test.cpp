@@ -169,9 +169,11 @@ TEST(Dressing, ATightGarmentPressesAsItsTensionOverTheRadius) {
   dress(simulation, 120);
   const double stretch = girth(simulation, 5) / (2 * kPanelWidth);
   const double tension = 200 * (stretch * stretch - 1) / 2 * stretch;
+  const VectorXd pressure = simulation.pressures(0);
+  EXPECT_NEAR(pressure.mean(), tension / kPole, 0.03 * tension / kPole);
   const Verdict verdict = simulation.verdict();
-  EXPECT_NEAR(verdict.largest_pressure, tension / kPole, 0.05 * tension / kPole);
-  EXPECT_NEAR(verdict.strain_weft, stretch - 1, 0.02 * (stretch - 1));
+  EXPECT_EQ(verdict.largest_pressure, pressure.maxCoeff());
+  EXPECT_NEAR(verdict.strain_weft, stretch - 1, 0.05 * (stretch - 1));
   EXPECT_EQ(verdict.particles_inside, 0);
 }
 

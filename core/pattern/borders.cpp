@@ -358,14 +358,15 @@ class Cutter {
         const std::size_t at = (begin + n) % ring.size();
         const Piece& piece = pieces_[as_index(ring[at])];
         const Piece& before = pieces_[as_index(ring[(at + ring.size() - 1) % ring.size()])];
-        if (before.count > 0) border.points.push_back(joint(ring, at));
+        if (before.count > 0) border.points.push_back(without_dust(joint(ring, at)));
         auto& own = points[as_index(ring[at])];
         own.push_back(static_cast<int>(border.points.size()) - 1);
         const Curve& line = curve(piece.panel, piece.edge);
         for (int i = 1; i < piece.count; ++i) {
           const double part = static_cast<double>(i) / piece.count;
           own.push_back(static_cast<int>(border.points.size()));
-          border.points.push_back(line.at(piece.from + part * (piece.to - piece.from)));
+          border.points.push_back(
+              without_dust(line.at(piece.from + part * (piece.to - piece.from))));
         }
       }
       const int count = static_cast<int>(border.points.size());

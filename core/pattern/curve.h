@@ -31,6 +31,12 @@ class Curve {
 
 inline double cross2(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
+// With 0 for coordinates so small, m, that products of them would underflow where signs are exact.
+inline Vector2d without_dust(const Vector2d& point) {
+  constexpr double kDust = 1e-30;
+  return (point.array().abs() < kDust).select(0, point.array()).matrix();
+}
+
 // Where each edge of a panel runs.
 std::vector<Curve> outline_of(const PatternPanel& panel);
 

@@ -15,8 +15,7 @@ namespace weft {
 namespace {
 
 constexpr double kMostParticles = 100'000;
-constexpr std::size_t kMostBorder = 10'000;  // points of a panel's: they are compared in pairs
-constexpr double kGoodHeight = 0.35;         // edges
+constexpr double kGoodHeight = 0.35;  // edges
 
 class Builder {
  public:
@@ -55,11 +54,7 @@ class Builder {
       const auto& points = borders_.panels[p].points;
       const double area = area_within(points), count = static_cast<double>(points.size());
       particles += count / 2 + std::max(0.0, area) / (edge_ * edge_ * std::numbers::sqrt3 / 2);
-      if (points.size() > kMostBorder)
-        problems_.push_back(
-            {edge_field_, join("makes ", points.size(), " particles around panel ",
-                               pattern_.panels[p].name, ", more than ", kMostBorder)});
-      else if (const auto crossing = find_crossing(points))
+      if (const auto crossing = find_crossing(points))
         tell_crossing(p, *crossing);
       else if (area <= 0)
         problems_.push_back(

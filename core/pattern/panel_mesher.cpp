@@ -21,11 +21,14 @@ std::size_t around(std::size_t i, std::size_t count) { return i < count ? i : i 
 // Lines of a border, to be found by place.
 class Lines {
  public:
-  Lines(const std::vector<Vector2d>& border, double cell) : border_(border), cell_(cell) {
+  Lines(const std::vector<Vector2d>& border, double least_cell) : border_(border) {
     low_ = high_ = border[0];
     for (const Vector2d& point : border) low_ = low_.cwiseMin(point), high_ = high_.cwiseMax(point);
-    columns_ = static_cast<int>((high_.x() - low_.x()) / cell) + 1;
-    rows_ = static_cast<int>((high_.y() - low_.y()) / cell) + 1;
+    // some cells a line, however large the border's box is
+    const double count = 4 * static_cast<double>(border.size());
+    cell_ = std::max(least_cell, std::sqrt((high_ - low_).prod() / count));
+    columns_ = static_cast<int>((high_.x() - low_.x()) / cell_) + 1;
+    rows_ = static_cast<int>((high_.y() - low_.y()) / cell_) + 1;
     cells_.resize(as_index(columns_) * as_index(rows_));
     for (std::size_t i = 0; i < border.size(); ++i) {
       const Vector2d &a = border[i], &b = border[around(i + 1, border.size())];
@@ -154,7 +157,8 @@ void smooth(Triangulation& mesh, const std::vector<std::size_t>& movable) {
 std::vector<Vector2d> turned(const std::vector<Vector2d>& points, double angle) {
   const Eigen::Rotation2Dd turn(angle);
   std::vector<Vector2d> result;
-  for (const Vector2d& point : points) result.push_back(angle == 0 ? point : turn * point);
+  for (const Vector2d& point : points)
+    result.push_back(angle == 0 ? point : without_dust(turn * point));
   return result;
 }
 

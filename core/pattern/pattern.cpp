@@ -12,6 +12,7 @@ namespace {
 constexpr std::size_t kMostPanels = 256, kMostEdges = 1024, kMostSeams = 1024, kMostRuns = 64;
 constexpr double kMostCoordinate = 100, kLeastLength = 1e-5;  // m
 constexpr double kMostGrain = 7;                              // rad
+constexpr double kMostLines = 10'000;  // around a panel: they are compared in pairs
 
 bool is_name(const std::string& text) {
   return text.size() <= 63 &&
@@ -28,14 +29,12 @@ std::string exact(double value) {
 
 class PatternCheck {
  public:
-  PatternCheck(const Pattern& pattern, const std::string& field)
-      : pattern_(pattern), field_(field) {}
-
-  void check_edge_length(double edge, const std::string& field) {
-    number(field, edge, kLeastPatternEdge, kMostPatternEdge, " m");
-  }
+  PatternCheck(const Pattern& pattern, double edge, const std::string& field,
+               const std::string& edge_field)
+      : pattern_(pattern), edge_(edge), field_(field), edge_field_(edge_field) {}
 
   std::vector<Problem> run() {
+    number(edge_field_, edge_, kLeastPatternEdge, kMostPatternEdge, " m");
     const std::size_t panels = pattern_.panels.size();
     if (panels < 1 || panels > kMostPanels)
       problem(field_ + ".panels", "has ", panels, " panels, not 1 to ", kMostPanels);
@@ -77,6 +76,11 @@ class PatternCheck {
       good &= check_edge(panel.edges[e], join(at, ".edges[", e, "]"));
     if (!good) return;
     const std::vector<Curve> outline = outline_of(panel);
+    double length = 0;
+    for (const Curve& curve : outline) length += curve.length();
+    if (length > kMostLines * edge_)
+      problem(edge_field_, "of ", edge_, " m makes about ", std::floor(length / edge_),
+              " lines around panel ", panel.name, ", more than ", kMostLines);
     for (std::size_t e = 0; e < outline.size(); ++e)
       if (outline[e].is_broken())
         problem(join(at, ".edges[", e, "].arc"),
@@ -173,7 +177,8 @@ class PatternCheck {
   }
 
   const Pattern& pattern_;
-  const std::string& field_;
+  double edge_;
+  const std::string &field_, &edge_field_;
   std::map<std::string, std::size_t> numbers_;  // of panels
   std::vector<Problem> problems_;
 };
@@ -182,9 +187,7 @@ class PatternCheck {
 
 std::vector<Problem> find_problems(const Pattern& pattern, double edge, const std::string& field,
                                    const std::string& edge_field) {
-  PatternCheck check(pattern, field);
-  check.check_edge_length(edge, edge_field);
-  return check.run();
+  return PatternCheck(pattern, edge, field, edge_field).run();
 }
 
 }  // namespace weft

@@ -238,8 +238,10 @@ void Triangulation::move(const std::vector<Vector2d>& points) {
         return moved[as_index(each.corner[k])];
       };
       if (orientation(place(0), place(1), place(2)) > 0) continue;
-      for (std::size_t k = 0; k < 3; ++k) place(k) = at(each.corner[k]);
-      more = true;
+      for (std::size_t k = 0; k < 3; ++k) {
+        more |= place(k) != at(each.corner[k]);
+        place(k) = at(each.corner[k]);
+      }
     }
   }
   points_ = std::move(moved);

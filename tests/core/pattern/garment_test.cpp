@@ -439,6 +439,16 @@ TEST(Garments, ShortEdgesBecomePointsAndSharpCornersAreNoted) {
   EXPECT_EQ(codes(built(pattern, 0.01)), (std::set<std::string>{"EDGE_SHORT", "PANEL_NARROW"}));
 }
 
+TEST(Garments, CoordinatesAndGrainsNextToNothingAreAsNothing) {
+  PatternPanel near = rectangle("front", 0.2, 0.3);
+  near.edges[3].points[0] = {5e-324, -1e-200};
+  near.edges[2].points[0].x() = 1e-160;
+  near.grain = 5e-324;
+  const Garment garment = built({{near}, {}}, 0.01),
+                exact = built({{rectangle("front", 0.2, 0.3)}, {}}, 0.01);
+  EXPECT_EQ(garment.mesh.triangles, exact.mesh.triangles);
+}
+
 TEST(Garments, WhatCannotBeCutOrSewnIsRefusedByItsField) {
   const auto field_of = [](const Pattern& pattern) { return refused(pattern)[0].field; };
   const PatternPanel good = rectangle("front", 0.2, 0.3);
@@ -470,6 +480,7 @@ TEST(Garments, WhatCannotBeCutOrSewnIsRefusedByItsField) {
   EXPECT_EQ(field_of({{bad}, {}}), "pattern.panels[0].edges[0].arc");
   EXPECT_EQ(refused({{good}, {}}, 0.2)[0].field, "edge_m");
   EXPECT_EQ(refused({{rectangle("sail", 5, 5)}, {}}, 0.01)[0].field, "edge_m");
+  EXPECT_EQ(refused({{rectangle("ribbon", 90, 0.01)}, {}}, 0.01)[0].field, "edge_m");
 }
 
 }  // namespace

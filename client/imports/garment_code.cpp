@@ -6,7 +6,6 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <optional>
 #include <set>
 
 #include "client/imports/imported_mesh.h"

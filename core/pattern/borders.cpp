@@ -1,11 +1,9 @@
 #include "core/pattern/borders.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <optional>
 #include <set>
 
 #include "core/model/text.h"

@@ -1,7 +1,9 @@
+#include "core/pattern/pattern.h"
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
-#include <tuple>
 
 #include "core/model/text.h"
 #include "core/pattern/curve.h"

@@ -465,12 +465,8 @@ DressForm make_dress_form(const Measures& measures) {
   const auto widest = [](const Round& a, const Round& b) { return a.radius < b.radius; };
   form.arm = {plan.shoulder, arm_direction(measures.arm_angle), plan.arm.back().along,
               std::max_element(plan.arm.begin() + 1, plan.arm.end(), widest)->radius};
-  const Round& thigh = *std::max_element(plan.leg.begin(), plan.leg.end(), widest);
-  form.leg = {
-      {thigh.side, thigh.along, thigh.forward}, -Vector3d::UnitY(), thigh.along, thigh.radius};
   form.neck_height = section_of(plan, "neck base").height;
   form.neck_girth = section_of(plan, "neck base").girth;
-  form.crotch_height = section_of(plan, "crotch").height;
   return form;
 }
 

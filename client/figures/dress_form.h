@@ -31,19 +31,17 @@ struct DressForm {
     double wanted, found;  // m
     double height;         // where the tape lies, m
   };
-  // An arm or leg, m.
-  struct Limb {
-    Vector3d top = Vector3d::Zero();        // its joint, of the left one
-    Vector3d direction = Vector3d::Zero();  // to the hand or foot, of length 1
+  struct Arm {
+    Vector3d top = Vector3d::Zero();        // its joint, of the left one, m
+    Vector3d direction = Vector3d::Zero();  // to the hand, of length 1
     double length = 0;
-    double radius = 0;  // of an upper arm, or thigh, at its widest
+    double radius = 0;  // of the upper arm, m
   };
   FigureMesh mesh;
   double stature = 0;  // m
   std::vector<Girth> girths;
-  Limb arm, leg;
+  Arm arm;
   double neck_height = 0, neck_girth = 0;  // at its base, m
-  double crotch_height = 0;                // m
 
   const Girth& girth(const std::string& name) const;  // one of `girths`
 };

@@ -21,17 +21,13 @@ constexpr double kMostStrain99 = 0.1;  // of cloth that fits
 constexpr double kMostSlid = 0.03;     // m
 constexpr double kMostDepth = 1e-4;    // of a particle in a collider, m
 
-// The nearest collider.
-struct Nearest {
-  Distance distance{kInfinite, Vector3d::UnitY()};
-  const Collider* collider = nullptr;
-};
-Nearest nearest_collider(const Scene& scene, const Vector3d& x, double time) {
-  Nearest nearest;
+// From the nearest collider.
+Distance distance_from_any(const Scene& scene, const Vector3d& x, double time) {
+  Distance least{kInfinite, Vector3d::UnitY()};
   for (const Collider& collider : scene.colliders)
-    if (const Distance found = distance(collider, x, time); found.value < nearest.distance.value)
-      nearest = {found, &collider};
-  return nearest;
+    if (const Distance found = distance(collider, x, time); found.value < least.value)
+      least = found;
+  return least;
 }
 
 // Of each particle, m^2.
@@ -70,7 +66,7 @@ void find_inside(const Scene& scene, const std::vector<Matrix3Xd>& x, double tim
                  Verdict& verdict) {
   for (const Matrix3Xd& sheet : x)
     for (const auto& position : sheet.colwise()) {
-      const double depth = -nearest_collider(scene, position, time).distance.value;
+      const double depth = -distance_from_any(scene, position, time).value;
       if (depth <= kMostDepth) continue;
       ++verdict.particles_inside;
       verdict.deepest = std::max(verdict.deepest, depth);
@@ -145,7 +141,7 @@ VectorXd pressures(const Scene& scene, const SheetDefinition& sheet, const Movin
   VectorXd pressure = VectorXd::Zero(x.cols());
   for (Eigen::Index i = 0; i < x.cols(); ++i) {
     if (moving.dynamics.inverse_mass[i] == 0 || areas[i] == 0) continue;
-    const auto [value, normal] = nearest_collider(scene, x.col(i), time).distance;
+    const auto [value, normal] = distance_from_any(scene, x.col(i), time);
     if (value < (1 + kTouching) * moving.skin)
       pressure[i] = std::max(0.0, -force.col(i).dot(normal)) / areas[i];
   }

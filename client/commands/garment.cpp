@@ -43,8 +43,8 @@ void write_pattern(Context& context, const v1::Pattern& pattern, const std::stri
 }
 
 void run_new_garment(Context& context, const NewGarmentOptions& options) {
-  const DressForm form = make_dress_form(measures_of(options.person));
-  write_pattern(context, make_garment(options.name, form), options.path, options.replace, {});
+  const v1::Pattern pattern = make_garment(options.name, measures_of(options.person));
+  write_pattern(context, pattern, options.path, options.replace, {});
 }
 
 struct ImportOptionsOfPattern {

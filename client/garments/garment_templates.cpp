@@ -356,6 +356,15 @@ const std::vector<Template>& all_templates() {
   return all;
 }
 
+const Template& template_of(const std::string& name) {
+  std::string names;
+  for (const Template& each : all_templates()) {
+    if (each.info.name == name) return each;
+    names += (names.empty() ? "" : ", ") + each.info.name;
+  }
+  throw usage_problem(fmt::format("there is no garment \"{}\"; there are {}", name, names));
+}
+
 }  // namespace
 
 std::vector<GarmentInfo> garment_templates() {
@@ -364,13 +373,12 @@ std::vector<GarmentInfo> garment_templates() {
   return infos;
 }
 
+v1::Pattern make_garment(const std::string& name, const Measures& measures) {
+  return template_of(name).make(make_dress_form(measures));
+}
+
 v1::Pattern make_garment(const std::string& name, const DressForm& form) {
-  std::string names;
-  for (const Template& each : all_templates()) {
-    if (each.info.name == name) return each.make(form);
-    names += (names.empty() ? "" : ", ") + each.info.name;
-  }
-  throw usage_problem(fmt::format("there is no garment \"{}\"; there are {}", name, names));
+  return template_of(name).make(form);
 }
 
 }  // namespace weft::client

@@ -17,5 +17,7 @@ std::vector<GarmentInfo> garment_templates();
 // A pattern for who has the form's measures, placed around it so that nothing starts inside.
 // Throws a Problem: no such template.
 v1::Pattern make_garment(const std::string& name, const DressForm& form);
+// The same with a form made for them.
+v1::Pattern make_garment(const std::string& name, const Measures& measures);
 
 }  // namespace weft::client

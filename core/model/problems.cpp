@@ -29,6 +29,8 @@ class Check {
     if (problems_.size() < kMost) problems_.push_back({field, message});
   }
 
+  std::size_t count() const { return problems_.size(); }
+
   // False, and a problem, unless the value is a number from `low` to `high`.
   bool number(const std::string& field, double value, double low, double high, const char* unit) {
     if (value >= low && value <= high) return true;  // false for NaN
@@ -273,7 +275,8 @@ void check_reach(const Scene& scene, const Collider& collider, const std::string
                                          text(skin) + " m");
 }
 
-void check_dressing(const Scene& scene, Check& check) {
+// sound: of each sheet, whether it has no problem of its own.
+void check_dressing(const Scene& scene, const std::vector<bool>& sound, Check& check) {
   constexpr std::size_t kMostHolds = 64;
   const Dressing& dressing = *scene.dressing;
   check.number("dressing.close_s", dressing.close, 0, 60, "s");
@@ -290,7 +293,9 @@ void check_dressing(const Scene& scene, Check& check) {
       check.problem(field + ".sheet", "the scene has no sheet " + std::to_string(hold.sheet));
       continue;
     }
-    const SheetDefinition& sheet = scene.sheets[static_cast<std::size_t>(hold.sheet)];
+    const auto index = static_cast<std::size_t>(hold.sheet);
+    if (!sound[index]) continue;
+    const SheetDefinition& sheet = scene.sheets[index];
     std::set<int> held;
     check_particles(hold.particles, sheet.particle_count(), field + ".particles",
                     "a hold has 1 particle or more", "held", held, check);
@@ -332,10 +337,13 @@ std::vector<Problem> find_problems(const Scene& scene) {
   check.number("colliders", static_cast<double>(scene.colliders.size()), 0, kMostColliders,
                "elements");
   std::set<std::string> sheet_names, collider_names;
+  std::vector<bool> sound;
   for (std::size_t s = 0; s < scene.sheets.size(); ++s) {
     const std::string field = at("sheets", s);
     check.name(field + ".name", scene.sheets[s].name, sheet_names);
+    const std::size_t before = check.count();
     check_sheet(scene.sheets[s], field, check);
+    sound.push_back(before < Check::kMost && check.count() == before);
   }
   for (std::size_t c = 0; c < scene.colliders.size(); ++c) {
     const Collider& collider = scene.colliders[c];
@@ -347,7 +355,7 @@ std::vector<Problem> find_problems(const Scene& scene) {
     check.path(field + ".path", collider.path);
     check.speed(field + ".path", collider.path);
   }
-  if (scene.dressing) check_dressing(scene, check);
+  if (scene.dressing) check_dressing(scene, sound, check);
   check_environment(scene.environment, check);
   check_solver(scene.solver, check);
   return check.take();

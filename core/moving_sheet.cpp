@@ -23,6 +23,10 @@ void MovingSheet::set_mesh(const Scene& scene, const SheetDefinition& definition
   if (dressing.ease < 1) ease_rest_shape(definition, dressing.ease, mesh);
   if (!scene.environment.wind) mesh.triangles = std::vector<std::array<int, 3>>();
   set_pins(definition);
+  set_air_and_weight(scene);
+}
+
+void MovingSheet::set_air_and_weight(const Scene& scene) {
   dynamics.drag = mesh.drag;
   if (dressing.drag > 0) {
     if (dynamics.drag.size() == 0) dynamics.drag = VectorXd::Zero(mesh.mass.size());
@@ -31,12 +35,20 @@ void MovingSheet::set_mesh(const Scene& scene, const SheetDefinition& definition
   dynamics.gravity = dressing.weight * scene.environment.gravity;
 }
 
-void MovingSheet::dress(const Scene& scene, const SheetDefinition& definition,
-                        const DressingState& state) {
+void MovingSheet::remake_mesh(const Scene& scene, const SheetDefinition& definition) {
   Mesh made = make_mesh(definition);
   made.damping = mesh.damping;  // costs more to find than all else
-  dressing = state;
   set_mesh(scene, definition, std::move(made));
+}
+
+void MovingSheet::dress(const Scene& scene, const SheetDefinition& definition,
+                        const DressingState& state) {
+  const bool keeps_shape = state.ease == dressing.ease;
+  dressing = state;
+  if (keeps_shape)
+    set_air_and_weight(scene);
+  else
+    remake_mesh(scene, definition);
 }
 
 void MovingSheet::release_memory() {
@@ -50,7 +62,7 @@ void MovingSheet::release_memory() {
 }
 
 void MovingSheet::restore_memory(const Scene& scene, const SheetDefinition& definition) {
-  dress(scene, definition, dressing);
+  remake_mesh(scene, definition);
   solver->restore_memory();
 }
 
@@ -97,6 +109,27 @@ void move_pins(const std::vector<Pin>& pins, double time, double dt, MovingSheet
     const Vector3d displacement = offset - offset_at(pin.path, time - dt);
     for (const int i : pin.particles)
       sheet.solver->move_held(i, sheet.start(i) + offset, displacement);
+  }
+}
+
+void hold_heights(const Scene& scene, double time, std::span<MovingSheet> sheets) {
+  const Vector3d& gravity = scene.environment.gravity;
+  const Vector3d up = gravity.isZero() ? Vector3d(Vector3d::UnitY()) : -gravity.normalized();
+  for (const Hold& hold : scene.dressing->holds) {
+    if (time > scene.dressing->close + hold.until) continue;
+    MovingSheet& sheet = sheets[static_cast<std::size_t>(hold.sheet)];
+    std::vector<int> particles;
+    for (const int i : hold.particles)
+      if (sheet.dynamics.inverse_mass[i] > 0) particles.push_back(i);
+    const auto count = static_cast<Eigen::Index>(particles.size());
+    if (count == 0) continue;
+    Matrix3Xd x(3, count), d(3, count);
+    sheet.solver->read(particles, x, d);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      x.col(k) = (sheet.start(particles[static_cast<std::size_t>(k)]) - x.col(k)).dot(up) * up;
+      d.col(k) = -d.col(k).dot(up) * up;
+    }
+    sheet.solver->displace(particles, x, d);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/motion/energy_budget.h"
@@ -26,7 +27,7 @@ struct MovingSheet {
 
   // Mesh, forces and skin of a definition: its textile as it is simulated, and its pins.
   void set_definition(const Scene& scene, const SheetDefinition& definition);
-  // Mesh and forces as they are while the sheet is put on.
+  // Mesh and forces as they are while the sheet is put on; what stays is not made anew.
   void dress(const Scene& scene, const SheetDefinition& definition, const DressingState& state);
   // Lets go of what follows from the definition, but for its damping, until it is restored by the
   // same.
@@ -52,8 +53,10 @@ struct MovingSheet {
   }
 
  private:
-  // Takes what `dressing` says into account.
+  // These take what `dressing` says into account.
   void set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made);
+  void remake_mesh(const Scene& scene, const SheetDefinition& definition);
+  void set_air_and_weight(const Scene& scene);
 
   mutable SheetState good_;  // empty: not looked at since
 };
@@ -66,6 +69,9 @@ double end_of_motion(const Scene& scene);
 
 // Held particles follow the paths of their pins in the step of dt that ends at `time`.
 void move_pins(const std::vector<Pin>& pins, double time, double dt, MovingSheet& sheet);
+// Particles of holds that last until `time` or longer go back to the height they started at, and do
+// not move up or down.
+void hold_heights(const Scene& scene, double time, std::span<MovingSheet> sheets);
 // Gives held particles the velocity of their paths in a step from `time` on.
 void set_pin_velocities(const std::vector<Pin>& pins, double time, double dt, Matrix3Xd& v);
 

@@ -69,7 +69,7 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
     move_pins(definition.pins, time + dt, dt, sheet);
     if (!sheet.dynamics.tethers.empty()) sheet.solver->pull_back(pool);
   }
-  if (scene.dressing) hold_heights(time + dt);
+  if (scene.dressing) hold_heights(scene, time + dt, sheets);
   if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame);
 
   // colliders last, so that no particle ends a step inside one
@@ -83,28 +83,6 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
     sheets[s].solver->resolve(Contacts(scene.colliders, scene.sheets[s].textile.friction,
                                        sheets[s].skin, time + dt, dt, deflate, growth),
                               pool);
-}
-
-// Particles on hold go back to the height they started at, and on without moving up or down.
-void Simulation::State::hold_heights(double time) {
-  for (const Hold& hold : scene.dressing->holds) {
-    if (time > scene.dressing->close + hold.until) continue;
-    MovingSheet& sheet = sheets[static_cast<std::size_t>(hold.sheet)];
-    const Vector3d& gravity = scene.environment.gravity;
-    const Vector3d up = gravity.isZero() ? Vector3d(Vector3d::UnitY()) : -gravity.normalized();
-    std::vector<int> particles;
-    for (const int i : hold.particles)
-      if (sheet.dynamics.inverse_mass[i] > 0) particles.push_back(i);
-    const auto count = static_cast<Eigen::Index>(particles.size());
-    if (count == 0) continue;
-    Matrix3Xd x(3, count), d(3, count);
-    sheet.solver->read(particles, x, d);
-    for (Eigen::Index k = 0; k < count; ++k) {
-      x.col(k) = (sheet.start(particles[static_cast<std::size_t>(k)]) - x.col(k)).dot(up) * up;
-      d.col(k) = -d.col(k).dot(up) * up;
-    }
-    sheet.solver->displace(particles, x, d);
-  }
 }
 
 // False: the frame cannot be computed.
@@ -266,10 +244,11 @@ Simulation::State::State(Scene given, SolverFactory factory)
     sheets[s].solver->start(x[s], v, 0, dt);
     sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
   }
-  make_cloth_contact();
-  if (scene.cloth_contact)
-    if (auto tangled = find_tangles(scene, x, open_seams()))
-      plan.warnings.push_back(std::move(*tangled));
+  if (scene.cloth_contact) {
+    const LeftOut open = open_seams();
+    cloth_contact.emplace(scene, open);
+    if (auto tangled = find_tangles(scene, x, open)) plan.warnings.push_back(std::move(*tangled));
+  }
   forget_motion();
 }
 

@@ -66,7 +66,6 @@ struct Simulation::State {
   bool begin_frame(bool in_parts);
   bool take_substeps(const Enough& enough, ThreadPool& pool);
   void step(double time, double dt, bool ends_frame, ThreadPool& pool);
-  void hold_heights(double time);
   Attempt inspect_sheets(NextStates& next);
   Decision repair(const Attempt& made, NextStates& next);
   void restart_from(NextStates& next);

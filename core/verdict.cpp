@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "core/cloth_contact/cuts.h"
 #include "core/contact/contact.h"
-#include "core/contact/triangle_tree.h"
 #include "core/forces/elastic.h"
 #include "core/model/strain.h"
 #include "core/model/text.h"
@@ -110,27 +108,6 @@ void find_faults(const Scene& scene, Verdict& verdict) {
 }
 
 }  // namespace
-
-VectorXd clearances(const Scene& scene, const Matrix3Xd& x, double time) {
-  VectorXd least = VectorXd::Constant(x.cols(), kInfinite);
-  for (const Collider& collider : scene.colliders) {
-    const auto* body = std::get_if<SharedBody>(&collider.shape);
-    std::optional<TriangleTree> tree;  // the grid is exact but near the surface
-    if (body != nullptr) tree.emplace((*body)->mesh);
-    const Vector3d offset = offset_at(collider.path, time);
-    int guess = 0;
-    for (Eigen::Index i = 0; i < x.cols(); ++i) {
-      double value = distance(collider, x.col(i), time).value;
-      if (tree) {
-        const TriangleTree::Nearest nearest = tree->nearest(x.col(i) - offset, guess);
-        guess = nearest.triangle;
-        value = std::copysign(std::sqrt(nearest.squared), value);
-      }
-      least[i] = std::min(least[i], value);
-    }
-  }
-  return least;
-}
 
 VectorXd pressures(const Scene& scene, const SheetDefinition& sheet, const MovingSheet& moving,
                    const Matrix3Xd& x, double time) {

@@ -30,10 +30,6 @@ struct Verdict {
   std::vector<Fault> faults;    // none: it is good
 };
 
-// Distances of particles from the nearest collider at a time, m, negative inside; infinity where a
-// scene has none. x: (3 x particles) m.
-VectorXd clearances(const Scene& scene, const Matrix3Xd& x, double time);
-
 // What colliders press each particle with, Pa: all that forces and weight push it towards one that
 // it touches, over a third of the area of its triangles. So it is for cloth at rest. x: (3 x
 // particles) m, of a sheet in that scene.

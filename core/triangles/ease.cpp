@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/forces/membrane.h"
 #include "core/triangles/rest_shape.h"
 #include "core/triangles/triangles.h"
 
@@ -13,17 +14,13 @@ namespace {
 using Eigen::Matrix2d;
 constexpr double kShortest = 0.7;  // of a thread's length
 
-// The symmetric factor of the deformation of a triangle along warp and weft.
+// S^2 of a triangle, along warp and weft.
 Eigen::SelfAdjointEigenSolver<Matrix2d> squared_stretch(const MembraneElement& element,
                                                         const Matrix3Xd& x) {
-  Vector3d along_warp = Vector3d::Zero(), along_weft = Vector3d::Zero();
-  for (std::size_t k = 0; k < 3; ++k) {
-    along_warp += element.du[k] * x.col(element.particle[k]);
-    along_weft += element.dv[k] * x.col(element.particle[k]);
-  }
+  const Threads thread = threads_of(element, x);
   Matrix2d squared;
-  squared << along_warp.squaredNorm(), along_warp.dot(along_weft), along_warp.dot(along_weft),
-      along_weft.squaredNorm();
+  squared << thread.warp.squaredNorm(), thread.warp.dot(thread.weft), thread.warp.dot(thread.weft),
+      thread.weft.squaredNorm();
   return Eigen::SelfAdjointEigenSolver<Matrix2d>(squared);
 }
 

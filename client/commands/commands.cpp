@@ -67,6 +67,15 @@ void add_session_or_scene_argument(CLI::App& command, std::string& given) {
       ->required();
 }
 
+void add_accuracy(CLI::App& command, std::optional<v1::Accuracy>& accuracy) {
+  const std::map<std::string, v1::Accuracy> accuracies{{"draft", v1::ACCURACY_DRAFT},
+                                                       {"standard", v1::ACCURACY_STANDARD},
+                                                       {"fine", v1::ACCURACY_FINE}};
+  command.add_option("--accuracy", accuracy, "How close to the equations, and how fast")
+      ->transform(one_of(accuracies))
+      ->option_text("draft|standard|fine");
+}
+
 FrameRange read_frame_range(const std::string& text) {
   FrameRange range;
   if (text.empty()) return range;

@@ -92,6 +92,7 @@ Measures measures_of(const Person& person);
 // The positional SESSION.
 void add_session_argument(CLI::App& command, std::string& session);
 void add_session_or_scene_argument(CLI::App& command, std::string& given);
+void add_accuracy(CLI::App& command, std::optional<v1::Accuracy>& accuracy);
 
 // "A:B", both included; either may be left out, and an empty text is all frames.
 FrameRange read_frame_range(const std::string& text);

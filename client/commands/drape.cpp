@@ -133,28 +133,65 @@ std::string verdict_text(const v1::Verdict& verdict, const Tally& tally) {
   return facts.text();
 }
 
-void run_drape(Context& context, const DrapeOptions& options) {
-  check(options);
-  context.prefer_embedded();
+// Pattern, bodies and all else that is asked for.
+GarmentOrder read_order(const DrapeOptions& options, std::string& notes) {
   GarmentOrder order;
   order.textile = textile_named(options.textile);
   order.edge_m = options.edge_m;
   const bool own = is_template(options.garment);
-  order.name = own ? options.garment
-                   : plain_name(std::filesystem::path(options.garment).stem().string(), "garment");
-  std::vector<std::string> notes;
   std::optional<DressForm> form;
   if (own || options.bodies.empty()) form = make_dress_form(measures_of(options.person));
   if (own) {
+    order.name = options.garment;
     order.pattern = make_garment(options.garment, *form);
   } else {
+    order.name = plain_name(std::filesystem::path(options.garment).stem().string(), "garment");
     ImportedPattern read = read_pattern(options.garment);
     order.pattern = std::move(read.pattern);
-    notes = std::move(read.notes);
+    for (const std::string& note : read.notes) notes += note + '\n';
   }
   for (const std::string& path : options.bodies) order.bodies.push_back(garment_body(path));
   if (options.bodies.empty()) order.bodies.push_back(garment_body(*form));
+  return order;
+}
 
+// Writes what is asked for, of a recording whose last frame is that, and tells of it.
+void write_files(const DrapeOptions& options, const std::string& name, const Recorded& recorded,
+                 std::int64_t last_frame, Json& document, std::string& text) {
+  const auto tell = [&](const char* what, const std::string& path) {
+    document[what] = path;
+    text += "wrote " + path + '\n';
+  };
+  if (!options.output.empty()) {
+    RecordingReader recording(recorded.path());
+    ExportOrder order;
+    order.format = *format_of(options.output);
+    order.path = options.output;
+    order.frames.first = order.frames.last = last_frame;
+    export_recording(recording, order, [](const ExportResult&) {});
+    tell("output", options.output);
+  }
+  if (!options.page.empty()) {
+    PageOrder order{.path = options.page, .title = name};
+    order.figures.push_back({.title = "", .caption = "", .exhibits = {{name, recorded.path()}}});
+    write_page(order, [](const std::string&) {});
+    tell("page", options.page);
+  }
+  if (recorded.kept()) tell("recording", recorded.path());
+}
+
+Problem not_good(const v1::Verdict& verdict) {
+  std::string why;
+  for (const v1::Fault& fault : verdict.faults())
+    why += (why.empty() ? "" : "; ") + fault.code() + ": " + fault.message();
+  return {Exit::kRefused, "FAILED_PRECONDITION", "DRAPE_NOT_GOOD", "not a good drape: " + why};
+}
+
+void run_drape(Context& context, const DrapeOptions& options) {
+  check(options);
+  context.prefer_embedded();
+  std::string text;
+  const GarmentOrder order = read_order(options, text);
   GarmentScene made = make_garment_scene(context.connection(), order);
   if (options.accuracy) made.scene.mutable_solver()->set_accuracy(*options.accuracy);
   const v1::Session session = create_session(context.connection(), made.scene);
@@ -165,37 +202,11 @@ void run_drape(Context& context, const DrapeOptions& options) {
   v1::GetVerdictRequest ask;
   ask.set_name(session.name());
   const v1::Verdict verdict = context.connection().call(&Sessions::GetVerdict, ask);
-  std::string text;
-  for (const std::string& note : notes) text += note + '\n';
+  Json document{{"garment", made.json}, {"verdict", to_json(verdict)}, {"session", session.name()}};
   text += made.text + verdict_text(verdict, result.tally);
-  Json document{{"garment", made.json}, {"verdict", to_json(verdict)}};
-  document["session"] = session.name();
-  if (!options.output.empty()) {
-    RecordingReader recording(recorded.path());
-    ExportOrder write;
-    write.format = *format_of(options.output);
-    write.path = options.output;
-    write.frames.first = write.frames.last = result.tally.last_frame;
-    export_recording(recording, write, [](const ExportResult&) {});
-    document["output"] = options.output;
-    text += "wrote " + options.output + '\n';
-  }
-  if (!options.page.empty()) {
-    PageOrder page{.path = options.page, .title = order.name};
-    page.figures.push_back(
-        {.title = "", .caption = "", .exhibits = {{order.name, recorded.path()}}});
-    write_page(page, [](const std::string&) {});
-    document["page"] = options.page;
-    text += "wrote " + options.page + '\n';
-  }
-  if (recorded.kept()) text += "wrote " + recorded.path() + '\n';
+  write_files(options, order.name, recorded, result.tally.last_frame, document, text);
   context.answer(document, text);
-  if (verdict.good()) return;
-  std::string why;
-  for (const v1::Fault& fault : verdict.faults())
-    why += (why.empty() ? "" : "; ") + fault.code() + ": " + fault.message();
-  throw Problem(Exit::kRefused, "FAILED_PRECONDITION", "DRAPE_NOT_GOOD",
-                "not a good drape: " + why);
+  if (!verdict.good()) throw not_good(verdict);
 }
 
 }  // namespace
@@ -223,12 +234,7 @@ void add_drape(CLI::App& app, Context& context) {
       ->capture_default_str();
   command->add_option("--edge", options->edge_m, "Wanted length of triangles' edges, m; else 0.01")
       ->type_name("M");
-  const std::map<std::string, v1::Accuracy> accuracies{{"draft", v1::ACCURACY_DRAFT},
-                                                       {"standard", v1::ACCURACY_STANDARD},
-                                                       {"fine", v1::ACCURACY_FINE}};
-  command->add_option("--accuracy", options->accuracy, "How close to the equations, and how fast")
-      ->transform(one_of(accuracies))
-      ->option_text("draft|standard|fine");
+  add_accuracy(*command, options->accuracy);
   command->add_option("--seconds", options->seconds, "Most simulated time until it is at rest, s")
       ->type_name("S")
       ->check(CLI::Range(0.1, 1000.0))
@@ -242,7 +248,8 @@ void add_drape(CLI::App& app, Context& context) {
   command->footer(R"(
 Panels start where the pattern places them. Seams close, without weight, then
 weight comes in; edges with the label "waist" are held up meanwhile. It ends at
-rest with a verdict, and exit code 1 where that is not good.
+rest with a verdict, and exit code 1 where that is not good. On a server that is
+named the session stays.
   weft drape tshirt --size 40 -o tshirt.glb --page tshirt.html
   weft drape pattern.json --body body.obj --textile denim_11oz -o out.glb
 )");

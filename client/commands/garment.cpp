@@ -67,7 +67,6 @@ struct BuildOptions {
   std::optional<double> edge_m;
   std::string textile = "wool_tropical";
   std::vector<std::string> panel_textiles, bodies;
-  bool contact = true;
   bool replace = false;
 };
 
@@ -89,7 +88,6 @@ void run_build(Context& context, const BuildOptions& options) {
       .textile = textile_named(options.textile),
       .edge_m = options.edge_m};
   for (const std::string& path : options.bodies) order.bodies.push_back(garment_body(path));
-  order.cloth_contact = options.contact;
   GarmentScene made = make_garment_scene(context.connection(), order);
   std::string text;
   for (const std::string& note : read.notes) text += note + '\n';

@@ -213,9 +213,6 @@ void add_new(CLI::App& scene, Context& context) {
                                                         {"exact", v1::EVALUATOR_EXACT},
                                                         {"linearized", v1::EVALUATOR_LINEARIZED},
                                                         {"polynomial", v1::EVALUATOR_POLYNOMIAL}};
-  const std::map<std::string, v1::Accuracy> accuracies{{"draft", v1::ACCURACY_DRAFT},
-                                                       {"standard", v1::ACCURACY_STANDARD},
-                                                       {"fine", v1::ACCURACY_FINE}};
   auto options = std::make_shared<NewOptions>();
   TemplateOptions& values = options->values;
   CLI::App* command =
@@ -251,9 +248,7 @@ void add_new(CLI::App& scene, Context& context) {
   command->add_flag("--fold-clamp", values.fold_clamp, "Linearize the clamped function (eq. 5)");
   command->add_flag("--optimal-breakpoints", values.optimal_breakpoints,
                     "Shorter segments where the law bends more");
-  command->add_option("--accuracy", values.accuracy, "How close to the equations, and how fast")
-      ->transform(one_of(accuracies))
-      ->option_text("draft|standard|fine");
+  add_accuracy(*command, values.accuracy);
   command
       ->add_option("--set", options->fields,
                    "One value by its place, such as sheets[0].skin_m=0.003; may be given again")

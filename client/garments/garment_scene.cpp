@@ -111,7 +111,7 @@ GarmentScene make_garment_scene(Connection& connection, const GarmentOrder& orde
   if (!sheet->textile().has_damping_kg_per_s() && !sheet->textile().has_damping_ratio())
     sheet->mutable_textile()->set_damping_kg_per_s(kDamping);
   for (const v1::Collider& body : order.bodies) *made.scene.add_colliders() = body;
-  made.scene.set_cloth_contact(order.cloth_contact);
+  made.scene.set_cloth_contact(true);
   set_dressing(built, *made.scene.mutable_dressing());
   return made;
 }

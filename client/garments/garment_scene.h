@@ -18,7 +18,6 @@ struct GarmentOrder {
   v1::Textile textile{};
   std::optional<double> edge_m{};
   std::vector<v1::Collider> bodies{};
-  bool cloth_contact = true;
 };
 
 struct GarmentScene {

@@ -235,14 +235,20 @@ Outline skirt_outline(const SkirtPiece& s, bool front) {
   return outline;
 }
 
-Outline band_outline(double half, double low, double height, bool front) {
+// A trapezoid on the body's middle.
+Outline trapezoid(const char* lower, double low, double low_half, const char* upper, double high,
+                  double high_half, bool front) {
   const std::string here = front ? "left" : "right", there = front ? "right" : "left";
-  Outline outline({-half, low});
-  outline.line("lower", {half, low});
-  outline.line(of_side("side", here).c_str(), {half, low + height});
-  outline.line("upper", {-half, low + height});
-  outline.line(of_side("side", there).c_str(), {-half, low});
+  Outline outline({-low_half, low});
+  outline.line(lower, {low_half, low});
+  outline.line(of_side("side", here).c_str(), {high_half, high});
+  outline.line(upper, {-high_half, high});
+  outline.line(of_side("side", there).c_str(), {-low_half, low});
   return outline;
+}
+
+Outline band_outline(double half, double low, double height, bool front) {
+  return trapezoid("lower", low, half, "upper", low + height, half, front);
 }
 
 v1::Pattern skirt(const DressForm& form) {
@@ -278,18 +284,6 @@ v1::Pattern skirt(const DressForm& form) {
   return draft.take();
 }
 
-// A trapezoid on the body's middle, its upper edge gathered into something.
-Outline flared_outline(const char* upper, double high, double high_half, double low,
-                       double low_half, bool front) {
-  const std::string here = front ? "left" : "right", there = front ? "right" : "left";
-  Outline outline({-low_half, low});
-  outline.line("hem", {low_half, low});
-  outline.line(of_side("side", here).c_str(), {high_half, high});
-  outline.line(upper, {-high_half, high});
-  outline.line(of_side("side", there).c_str(), {-low_half, low});
-  return outline;
-}
-
 v1::Pattern dress(const DressForm& form) {
   constexpr double kGathers = 1.35;
   const Surroundings body(form);
@@ -307,7 +301,7 @@ v1::Pattern dress(const DressForm& form) {
   for (const bool front : {true, false}) {
     const std::string name = front ? "front" : "back";
     const Outline outline =
-        flared_outline("waist", b.hem - 0.015, waist_half, hem, hem_half, front);
+        trapezoid("hem", hem, hem_half, "waist", b.hem - 0.015, waist_half, front);
     draft.add("skirt-" + name, outline, (front ? front_of : back_of)(outline, body));
     draft.sew({name, {"hem"}}, {"skirt-" + name, {"waist"}});
   }

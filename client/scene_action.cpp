@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <utility>
 
 #include "client/problem.h"
 
@@ -26,15 +27,6 @@ const Named& named(const google::protobuf::RepeatedPtrField<Named>& all, const s
                           : fmt::format("there is no {} \"{}\"; there are {}", what, name, names));
 }
 
-int particle_of(const SceneAction& action, const v1::Scene& scene) {
-  const v1::Grid& grid = named(scene.sheets(), action.name, "sheet").grid();
-  const bool there = action.row >= 0 && action.row < grid.rows() && action.column >= 0 &&
-                     action.column < grid.columns();
-  if (there) return action.row * grid.columns() + action.column;
-  throw usage_problem(fmt::format("row {}, column {} is not on a sheet of {} x {} particles",
-                                  action.row, action.column, grid.rows(), grid.columns()));
-}
-
 void set_target(const SceneAction& action, v1::Vector3* target, auto* led) {
   if (action.target_m) {
     target->set_x((*action.target_m)[0]);
@@ -46,11 +38,35 @@ void set_target(const SceneAction& action, v1::Vector3* target, auto* led) {
 
 }  // namespace
 
+int particle_number(const ParticlePlace& place, const v1::Sheet& sheet) {
+  const v1::Grid& grid = sheet.grid();
+  if (!place.number && sheet.has_grid()) {
+    const bool there = place.row >= 0 && place.row < grid.rows() && place.column >= 0 &&
+                       place.column < grid.columns();
+    if (there) return place.row * grid.columns() + place.column;
+    throw usage_problem(fmt::format("row {}, column {} is not on a sheet of {} x {} particles",
+                                    place.row, place.column, grid.rows(), grid.columns()));
+  }
+  if (!place.number)
+    throw usage_problem(fmt::format(
+        "the sheet is of triangles, which have no rows and columns: give a particle's number, not "
+        "{},{}",
+        place.row, place.column));
+  const v1::MeshData& data = sheet.triangles().data();
+  const int particles = sheet.has_grid() ? grid.rows() * grid.columns()
+                                         : static_cast<int>(data.positions_m().empty()
+                                                                ? data.flat_m().size() / 8
+                                                                : data.positions_m().size() / 12);
+  if (*place.number >= 0 && (particles == 0 || *place.number < particles)) return *place.number;
+  throw usage_problem(
+      fmt::format("particle {} is not on a sheet of {} particles", *place.number, particles));
+}
+
 v1::Action to_action(const SceneAction& action, const v1::Scene& scene) {
   v1::Action to;
   if (action.kind == "move_collider") {
     v1::MoveCollider* move = to.mutable_move_collider();
-    move->set_collider(named(scene.colliders(), action.name, "collider").name());
+    move->set_collider(named(scene.colliders(), action.collider, "collider").name());
     set_target(action, move->mutable_offset_m(), move);
     return to;
   }
@@ -59,23 +75,31 @@ v1::Action to_action(const SceneAction& action, const v1::Scene& scene) {
   const auto set = [&](const char* name, const auto& value, auto setter) {
     (part->GetReflection()->*setter)(part, part->GetDescriptor()->FindFieldByName(name), value);
   };
-  set("sheet", action.name, &google::protobuf::Reflection::SetString);
-  set("particle", particle_of(action, scene), &google::protobuf::Reflection::SetInt32);
+  const ParticlePlace& particle = action.particle;
+  set("sheet", particle.sheet, &google::protobuf::Reflection::SetString);
+  set("particle", particle_number(particle, named(scene.sheets(), particle.sheet, "sheet")),
+      &google::protobuf::Reflection::SetInt32);
   if (to.has_drag()) set_target(action, to.mutable_drag()->mutable_target_m(), to.mutable_drag());
   return to;
 }
 
-void read_particle(const std::string& text, SceneAction& action) {
+ParticlePlace read_particle(const std::string& text) {
+  ParticlePlace place;
   const std::size_t colon = text.rfind(':');
-  const std::string place = colon == std::string::npos ? text : text.substr(colon + 1);
-  if (colon != std::string::npos) action.name = text.substr(0, colon);
-  const char* const end = place.data() + place.size();
-  const auto row = std::from_chars(place.data(), end, action.row);
-  if (row.ec == std::errc() && row.ptr != end && *row.ptr == ',') {
-    const auto column = std::from_chars(row.ptr + 1, end, action.column);
-    if (column.ec == std::errc() && column.ptr == end) return;
+  const std::string where = colon == std::string::npos ? text : text.substr(colon + 1);
+  if (colon != std::string::npos) place.sheet = text.substr(0, colon);
+  const char* const end = where.data() + where.size();
+  const auto first = std::from_chars(where.data(), end, place.row);
+  if (first.ec == std::errc() && first.ptr == end) {
+    place.number = std::exchange(place.row, 0);
+    return place;
   }
-  throw usage_problem(fmt::format("{}: write ROW,COLUMN or SHEET:ROW,COLUMN", text));
+  if (first.ec == std::errc() && *first.ptr == ',') {
+    const auto column = std::from_chars(first.ptr + 1, end, place.column);
+    if (column.ec == std::errc() && column.ptr == end) return place;
+  }
+  throw usage_problem(
+      fmt::format("{}: write ROW,COLUMN or NUMBER, after SHEET: where there are several", text));
 }
 
 }  // namespace weft::client

@@ -8,12 +8,25 @@
 
 namespace weft::client {
 
+// A particle, as people say it: on a grid by row and column, on any sheet by its number.
+struct ParticlePlace {
+  std::string sheet{};  // empty: the only one
+  std::optional<int> number{};
+  int row = 0;
+  int column = 0;
+
+  auto operator<=>(const ParticlePlace&) const = default;
+};
+
+// Its number. Throws where the sheet has no such particle, as far as can be said: of a mesh that is
+// an asset the server knows.
+int particle_number(const ParticlePlace& place, const v1::Sheet& sheet);
+
 // What is done to a particle or a collider, as people say it.
 struct SceneAction {
-  std::string kind;    // field of weft.v1.Action, "grab"
-  std::string name{};  // of the sheet or collider; empty: the only one
-  int row = 0;         // of the particle
-  int column = 0;
+  std::string kind;        // field of weft.v1.Action, "grab"
+  std::string collider{};  // empty: the only one
+  ParticlePlace particle{};
   std::optional<std::array<double, 3>> target_m{};  // of a collider as an offset from its start
   std::optional<double> duration_s{};
 };
@@ -21,7 +34,7 @@ struct SceneAction {
 // Throws where the scene has no such particle or collider.
 v1::Action to_action(const SceneAction& action, const v1::Scene& scene);
 
-// "drape:3,5", or "3,5", as sheet, row and column.
-void read_particle(const std::string& text, SceneAction& action);
+// "drape:3,5", "drape:17", "3,5" or "17": sheet, and row and column or number.
+ParticlePlace read_particle(const std::string& text);
 
 }  // namespace weft::client

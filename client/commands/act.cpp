@@ -8,13 +8,13 @@ namespace {
 
 struct ActOptions {
   std::string session;
-  std::string particle;  // "sheet:0,5"
+  std::string particle;  // "sheet:0,5", or "sheet:17"
   SceneAction action;
   std::vector<double> target_m;
 };
 
 void run_act(Context& context, ActOptions options) {
-  if (!options.particle.empty()) read_particle(options.particle, options.action);
+  if (!options.particle.empty()) options.action.particle = read_particle(options.particle);
   if (options.target_m.empty() && options.action.duration_s)
     throw usage_problem("--over says how long --to takes; give both");
   if (!options.target_m.empty())
@@ -47,7 +47,9 @@ void add_act(CLI::App& app, Context& context) {
   };
   const auto add_particle = [&](const char* kind, const char* description) {
     auto added = add(kind, kind, description);
-    added.first->add_option("PARTICLE", added.second->particle, "ROW,COLUMN or SHEET:ROW,COLUMN")
+    added.first
+        ->add_option("PARTICLE", added.second->particle,
+                     "ROW,COLUMN on a grid, or its number; SHEET:... of several")
         ->option_text(" ")
         ->required();
     return added;
@@ -70,7 +72,8 @@ void add_act(CLI::App& app, Context& context) {
   add_particle("pin", "Hold a particle where it is, or will be released");
   add_particle("unpin", "End a pin, of the scene too");
   const auto move = add("move", "move_collider", "Move a collider");
-  move.first->add_option("COLLIDER", move.second->action.name, "Its name, where there are several")
+  move.first
+      ->add_option("COLLIDER", move.second->action.collider, "Its name, where there are several")
       ->option_text(" ");
   add_target(move, "Where to, as an offset from its start, m")->required();
 }

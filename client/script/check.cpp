@@ -15,8 +15,8 @@ namespace {
 
 // A session as it would be.
 struct Known {
-  std::optional<v1::Session> session{};                   // none where the server refuses it
-  std::set<std::tuple<std::string, int, int>> grabbed{};  // sheet, row, column
+  std::optional<v1::Session> session{};             // none where the server refuses it
+  std::set<std::pair<std::string, int>> grabbed{};  // sheet, particle
   std::int64_t snapshots = 0;
 };
 
@@ -122,12 +122,12 @@ class Checker {
     } catch (const Problem& problem) {
       return fault(step, "", problem.what());
     }
-    const auto particle = std::tuple(what.action.name, what.action.row, what.action.column);
-    if (action.has_grab() && !grabbed.insert(particle).second)
+    const auto particle = [](const auto& of) { return std::pair(of.sheet(), of.particle()); };
+    if (action.has_grab() && !grabbed.insert(particle(action.grab())).second)
       fault(step, "", "the particle is grabbed already");
-    if (action.has_drag() && !grabbed.contains(particle))
+    if (action.has_drag() && !grabbed.contains(particle(action.drag())))
       fault(step, "", "the particle was not grabbed before this");
-    if (action.has_release() && grabbed.erase(particle) == 0)
+    if (action.has_release() && grabbed.erase(particle(action.release())) == 0)
       fault(step, "", "the particle was not grabbed before this");
   }
 
@@ -149,20 +149,21 @@ class Checker {
     if (!session) return;
     for (const Expectation& expectation : what.expectations) {
       if (expectation.quantity != Quantity::kPosition) continue;
+      const ParticlePlace& place = expectation.particle;
       const v1::Sheet* sheet = nullptr;
       for (const auto& each : session->scene().sheets()) {
-        const bool meant = expectation.sheet.empty() || each.name() == expectation.sheet;
+        const bool meant = place.sheet.empty() || each.name() == place.sheet;
         if (meant && sheet == nullptr) sheet = &each;
       }
       if (sheet == nullptr) {
         fault(step, ".particle.sheet",
-              fmt::format("{} has no sheet \"{}\"", what.session, expectation.sheet));
-      } else if (expectation.row >= sheet->grid().rows() ||
-                 expectation.column >= sheet->grid().columns()) {
-        fault(
-            step, ".particle",
-            fmt::format("row {}, column {} is not on a sheet of {} x {} particles", expectation.row,
-                        expectation.column, sheet->grid().rows(), sheet->grid().columns()));
+              fmt::format("{} has no sheet \"{}\"", what.session, place.sheet));
+        continue;
+      }
+      try {
+        particle_number(place, *sheet);
+      } catch (const Problem& problem) {
+        fault(step, ".particle", problem.what());
       }
     }
   }

@@ -31,9 +31,11 @@ v1::FrameFormat format_of(const Case& performed, const std::string& session) {
 
 double position(const Sight& sight, const Expectation& expectation) {
   for (const auto& sheet : sight.header.sheets()) {
-    if (!expectation.sheet.empty() && sheet.name() != expectation.sheet) continue;
+    const ParticlePlace& place = expectation.particle;
+    if (!place.sheet.empty() && sheet.name() != place.sheet) continue;
     const int particle =
-        sheet.first_particle() + expectation.row * sheet.columns() + expectation.column;
+        sheet.first_particle() + place.number.value_or(place.row * sheet.columns() + place.column);
+    if (place.number && *place.number >= sheet.particle_count()) break;
     const Points point =
         read_points(sight.frame.positions_m(), sight.header, static_cast<std::size_t>(particle), 1);
     return (expectation.axis == 0 ? point.x : expectation.axis == 1 ? point.y : point.z)[0];

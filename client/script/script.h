@@ -90,10 +90,8 @@ struct Expectation {
   std::string name{};  // as the script has it, "particle.y_m"
   double low = 0;
   double high = 0;
-  std::string sheet{};  // of kPosition; empty: the first
-  int row = 0;
-  int column = 0;
-  int axis = 0;  // 0 to 2
+  ParticlePlace particle{};  // of kPosition; without a sheet: of the first
+  int axis = 0;              // 0 to 2
 };
 
 struct ExpectStep {

@@ -340,6 +340,23 @@ class ScriptReader {
     return step;
   }
 
+  static ParticlePlace read_particle_place(Fields& fields) {
+    const auto whole = [&](const char* key, std::int64_t most) {
+      const auto value = fields.whole_number(key, 0, most);
+      return value ? std::optional(static_cast<int>(*value)) : std::nullopt;
+    };
+    ParticlePlace place{.sheet = fields.text("sheet").value_or(""),
+                        .number = whole("number", std::numeric_limits<int>::max())};
+    place.row = whole("row", 4095).value_or(0);
+    place.column = whole("column", 4095).value_or(0);
+    for (const char* key : {"row", "column"}) {
+      if (fields.has(key) && fields.has("number")) fields.fault(key, "is given beside number");
+      if (!fields.has(key) && !fields.has("number"))
+        fields.fault("", std::string(key) + " is missing");
+    }
+    return place;
+  }
+
   // "grab" ... of a particle, or "move" of a collider.
   What read_act(Fields& fields, Scope&) {
     ActStep step{.session = read_session(fields), .action = {.kind = fields.place("")}};
@@ -347,14 +364,9 @@ class ScriptReader {
     const bool moves = action.kind == "move";
     if (moves) {
       action.kind = "move_collider";
-      action.name = fields.text("collider").value_or("");
+      action.collider = fields.text("collider").value_or("");
     } else {
-      action.name = fields.text("sheet").value_or("");
-      action.row = static_cast<int>(fields.whole_number("row", 0, 4095).value_or(0));
-      action.column = static_cast<int>(fields.whole_number("column", 0, 4095).value_or(0));
-      for (const char* key : {"row", "column"}) {
-        if (!fields.has(key)) fields.fault("", std::string(key) + " is missing");
-      }
+      action.particle = read_particle_place(fields);
     }
     if (!moves && action.kind != "drag") return step;
     std::vector<double> target;
@@ -433,12 +445,7 @@ class ScriptReader {
     if (fields.has("particle")) {
       Fields place(particle, "expect.particle", scope);
       Expectation expectation{.quantity = Quantity::kPosition};
-      expectation.sheet = place.text("sheet").value_or("");
-      expectation.row = static_cast<int>(place.whole_number("row", 0, 4095).value_or(0));
-      expectation.column = static_cast<int>(place.whole_number("column", 0, 4095).value_or(0));
-      for (const char* key : {"row", "column"}) {
-        if (!place.has(key)) place.fault("", std::string(key) + " is missing");
-      }
+      expectation.particle = read_particle_place(place);
       bool any = false;
       for (int axis = 0; axis < 3; ++axis) {
         const std::string key = fmt::format("{}_m", "xyz"[axis]);

@@ -132,7 +132,11 @@ TEST_F(CommandsTest, ACornerIsGrabbedDraggedAndReleased) {
               HasSubstr("actions[0].release.particle: 19 is not grabbed"));
   EXPECT_THAT(weft({"act", "pin", "cloth", "4,4"}).err,
               HasSubstr("row 4, column 4 is not on a sheet of 4 x 5 particles"));
-  EXPECT_THAT(weft({"act", "pin", "cloth", "4"}).err, HasSubstr("4: write ROW,COLUMN or SHEET:"));
+  EXPECT_THAT(weft({"act", "pin", "cloth", "4,"}).err,
+              HasSubstr("4,: write ROW,COLUMN or NUMBER, after SHEET:"));
+  EXPECT_EQ(weft({"act", "pin", "cloth", "sheet:19"}).out, "applied from frame 8\n");
+  EXPECT_THAT(weft({"act", "pin", "cloth", "20"}).err,
+              HasSubstr("particle 20 is not on a sheet of 20 particles"));
   EXPECT_THAT(weft({"act", "move", "cloth", "--to", "0,1,0"}).err,
               HasSubstr("the scene has no collider"));
 }

@@ -6,6 +6,7 @@
 
 #include "client/recording/reader.h"
 #include "tests/client/client_test.h"
+#include "tests/support/service/assets.h"
 
 namespace weft::testing {
 namespace {
@@ -102,6 +103,34 @@ steps:
   EXPECT_THAT(
       refusal("steps:\n  - create: {scene: scene.json}\n  - drag: {row: 0, to_m: [1, 2]}\n"),
       AllOf(HasSubstr("column is missing"), HasSubstr("drag.to_m")));
+}
+
+TEST_F(ScriptTest, ParticlesOfTrianglesGoByTheirNumber) {
+  scene_file(scene_of(square_mesh(4)));
+  EXPECT_EQ(ask({"script", script(R"(
+steps:
+  - create: {scene: scene.json}
+  - grab: {number: 24}
+  - drag: {number: 24, to_m: [0.3, 0, 0.1], over_s: 0.1}
+  - run: {until_frame: 8}
+  - expect: {particle: {number: 24, x_m: {near: 0.3, within: 1.0e-6}}}
+  - release: {number: 24}
+)")})["failed"],
+            0);
+  EXPECT_THAT(refusal("steps:\n  - create: {scene: scene.json}\n  - grab: {row: 1, column: 2}\n"),
+              AllOf(HasSubstr("line 3: grab"), HasSubstr("give a particle's number, not 1,2")));
+  EXPECT_THAT(refusal("steps:\n  - create: {scene: scene.json}\n  - grab: {number: 3, row: 1}\n"),
+              HasSubstr("line 3: grab.row: is given beside number"));
+  scene_file(small_scene());
+  EXPECT_THAT(refusal(R"(steps:
+  - create: {scene: scene.json}
+  - grab: {number: 19}
+  - release: {row: 3, column: 4}
+  - pin: {number: 20}
+  - expect: {particle: {number: 20, x_m: 1}}
+)"),
+              AllOf(Not(HasSubstr("line 4")), HasSubstr("particle 20 is not on a sheet of 20"),
+                    HasSubstr("line 5: pin"), HasSubstr("line 6: expect.particle")));
 }
 
 TEST_F(ScriptTest, ATextileChangesOverTime) {

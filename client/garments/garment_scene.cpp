@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <map>
-#include <set>
 #include <string_view>
 
 #include "client/imports/import.h"
@@ -64,17 +63,6 @@ std::string built_text(const v1::Pattern& pattern, const v1::BuildGarmentRespons
   return facts.text();
 }
 
-// Waists are held up until the garment hangs.
-void set_dressing(const v1::BuildGarmentResponse& built, v1::Dressing& dressing) {
-  std::set<int> waist;
-  for (const v1::BuiltEdge& edge : built.edges())
-    if (edge.label() == "waist" || edge.label().starts_with("waist-"))
-      waist.insert(edge.particles().begin(), edge.particles().end());
-  if (waist.empty()) return;
-  v1::Hold* hold = dressing.add_holds();
-  hold->mutable_particles()->Add(waist.begin(), waist.end());
-}
-
 v1::Collider body_of(const std::string& name, const ImportedMesh& mesh) {
   v1::Collider body;
   body.set_name(name);
@@ -112,7 +100,7 @@ GarmentScene make_garment_scene(Connection& connection, const GarmentOrder& orde
     sheet->mutable_textile()->set_damping_kg_per_s(kDamping);
   for (const v1::Collider& body : order.bodies) *made.scene.add_colliders() = body;
   made.scene.set_cloth_contact(true);
-  set_dressing(built, *made.scene.mutable_dressing());
+  *made.scene.mutable_dressing() = built.dressing();
   return made;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <set>
 
 #include "core/model/text.h"
 #include "server/convert/mesh.h"
@@ -74,6 +75,16 @@ class PatternReader {
   std::vector<Problem> problems_;
 };
 
+// Waists are held up.
+void set_dressing(v1::BuildGarmentResponse& built) {
+  std::set<int> waist;
+  for (const v1::BuiltEdge& edge : built.edges())
+    if (edge.label() == "waist" || edge.label().starts_with("waist-"))
+      waist.insert(edge.particles().begin(), edge.particles().end());
+  v1::Dressing* dressing = built.mutable_dressing();
+  if (!waist.empty()) dressing->add_holds()->mutable_particles()->Add(waist.begin(), waist.end());
+}
+
 v1::BuildGarmentResponse to_proto(Garment garment, const v1::Pattern& pattern, double edge) {
   v1::BuildGarmentResponse to;
   to.set_least_height(garment.least_height / edge);
@@ -92,6 +103,7 @@ v1::BuildGarmentResponse to_proto(Garment garment, const v1::Pattern& pattern, d
     added->mutable_particles()->Assign(each.particles.begin(), each.particles.end());
     added->set_length_m(each.length);
   }
+  set_dressing(to);
   v1::MeshData* mesh = to.mutable_sheet()->mutable_triangles()->mutable_data();
   *mesh = to_proto(complete(std::move(garment.mesh)));
   for (int p = 0; p < pattern.panels_size(); ++p)

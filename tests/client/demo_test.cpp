@@ -14,7 +14,8 @@ using DemoTest = ClientTest;
 
 TEST_F(DemoTest, EndsWithTheExperimentsTheSpeedOfEachLawAndOnePageOfAll) {
   const auto result = ask({"demo", "--longest", "0.2", "-o", path("demo")});
-  EXPECT_EQ(result["runs"].size(), 11U);
+  EXPECT_EQ(result["runs"].size(), 12U);
+  EXPECT_EQ(result["runs"][11]["verdict"], "not good") << "after 0.2 s";
   const auto& speed = result["speed"];
   ASSERT_EQ(speed.size(), 5U);
   EXPECT_EQ(speed[0]["bending"], "series");
@@ -29,6 +30,7 @@ TEST_F(DemoTest, EndsWithTheExperimentsTheSpeedOfEachLawAndOnePageOfAll) {
   EXPECT_THAT(page, HasSubstr(R"("title":"Speed")"));
   EXPECT_THAT(page, HasSubstr(R"({"group":"Measured","rows":[["time",)"));
   EXPECT_THAT(page, HasSubstr(R"(["against series","1.00 x"])"));
+  EXPECT_THAT(page, HasSubstr(R"("title":"Dressed")"));
   EXPECT_TRUE(std::filesystem::exists(path("demo/paper-4-exact.pc2")));
 }
 

@@ -285,6 +285,46 @@ class Plain(unittest.TestCase):
         self.assertEqual(refused.exception.violations[0].field,
                          "pattern.panels[0].edges[2].points_m")
 
+    def test_a_tube_is_put_on_a_pole(self):
+        half = 0.1
+        outline = [(half, -0.05), (half, 0.05), (-half, 0.05), (-half, -0.05)]
+        edges = [weft.PatternEdge([corner]) for corner in outline]
+        edges[2].label = "waist"
+        back = weft.Placement(origin_m=(0, 0, -0.07), rotation=(0, 0, 1, 0))
+        front = weft.Placement(origin_m=(0, 0, 0.07))
+        sides = [weft.PatternSeam([weft.EdgeRun("front", mine)], [weft.EdgeRun("back", theirs)])
+                 for mine, theirs in ((1, 3), (3, 1))]
+        tube = weft.Pattern([weft.PatternPanel("front", edges, placement=front),
+                             weft.PatternPanel("back", edges, placement=back)], sides)
+        pole = weft.Collider(weft.Capsule(0.062, (0, -0.2, 0), (0, 0.2, 0)),
+                             friction_coefficient=0.5)
+        with tempfile.TemporaryDirectory() as directory:
+            tube.save(f"{directory}/tube.json")
+            worn = self.server.drape(weft.Pattern.load(f"{directory}/tube.json"), [pole],
+                                     weft.Textile.preset("jersey_interlock"), edge_m=0.02,
+                                     accuracy="DRAFT", seconds=5)
+        self.assertTrue(worn.verdict.dressed)
+        self.assertEqual(worn.verdict.particles_inside, 0)
+        self.assertEqual(worn.frame.number, worn.session.get().frame)
+        across = np.hypot(worn.frame.positions[:, 0], worn.frame.positions[:, 2])
+        self.assertGreater(across.min(), 0.0618)  # the pole, all around
+        self.assertLess(across.max(), 0.068)
+        self.assertEqual(len(worn.mesh.positions_m), len(worn.frame.positions))
+        worn.session.delete()
+
+    def test_bodies_are_read_from_obj_files(self):
+        with tempfile.TemporaryDirectory() as directory:
+            file = pathlib.Path(directory, "body.obj")
+            file.write_text("# box\nv 0 0 0\nv 1 0 0 # corner\nv 1 1 0\nv 0 1 0\n"
+                            "vt 0 0\nf 1/1 2/1 3/1 4/1\nf -1 -2 -3\n")
+            mesh = weft.Collider.load(file, name="box").shape.source
+            self.assertEqual(np.shape(mesh.positions_m), (4, 3))
+            self.assertEqual([list(each) for each in mesh.triangles],
+                             [[0, 1, 2], [0, 2, 3], [3, 2, 1]])
+            file.write_text("v 0 0\n")
+            with self.assertRaises(weft.InvalidArgument):
+                weft.Collider.load(file)
+
     def test_scenes_are_the_scene_files(self):
         with tempfile.TemporaryDirectory() as directory:
             for template in "hang", "sphere", "box", "flag":
@@ -450,6 +490,9 @@ class Awaited(unittest.TestCase):
         panel = weft.PatternPanel("kite", [weft.PatternEdge([each]) for each in corners])
         built = await server.build_garment(weft.Pattern([panel]), edge_m=0.05)
         self.assertEqual([len(each.particles) for each in built.edges], [3, 4, 3])
+        worn = await server.drape(weft.Pattern([panel]), [], weft.Textile.preset("denim_11oz"),
+                                  edge_m=0.05, seconds=0.1)
+        self.assertEqual((worn.frame.number, worn.verdict.dressed), (6, False))
         self.assertGreater((await server.info()).limits.max_sessions, 0)
         self.assertGreater((await server.stats()).uptime_s, 0)
 

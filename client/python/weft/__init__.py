@@ -5,7 +5,7 @@ What is given to a server are the dataclasses of `weft.scene`; what it answers a
 `weft.aio` has the same to be awaited.
 """
 from . import aio, errors, v1
-from .client import Hand, Server, Session, connect, serve
+from .client import Drape, Hand, Server, Session, connect, serve
 from .errors import Damaged, Error, InvalidArgument, NoConnection, NotFound, Violation
 from .frame import Frame
 from .recording import Recording, open
@@ -51,7 +51,7 @@ from .scene import (
 
 __all__ = [
     "BendingLaw", "BodyMesh", "Box", "Capsule", "ChoiKo", "Collider", "Damaged", "Drag",
-    "Dressing", "EdgeRun", "Environment", "Error", "Frame", "Grab", "Grid", "Hand", "Hold",
+    "Drape", "Dressing", "EdgeRun", "Environment", "Error", "Frame", "Grab", "Grid", "Hand", "Hold",
     "InvalidArgument", "Isometric", "Keyframe", "MeasuredTextile", "MeshData", "MoveCollider",
     "NoConnection", "NotFound", "Panel", "Pattern", "PatternEdge", "PatternPanel", "PatternSeam",
     "Pin", "PinParticle", "Placement", "Plane", "RawTextile", "Recording", "Release", "Scene",

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from typing import Any, AsyncGenerator, Callable, Iterable, Sequence
+from typing import Any, AsyncGenerator, Callable, Iterable, NamedTuple, Sequence
 
 import grpc
 
@@ -20,8 +20,10 @@ from .errors import InvalidArgument, Refusal
 from .frame import Encoding, Frame, format_of, topology_of
 from .process import Process
 from .scene import (
+    Accuracy,
     Action,
     BendingLaw,
+    Collider,
     Drag,
     Grab,
     LabDirection,
@@ -164,6 +166,25 @@ class Server:
             calls.garment_request(pattern, edge_m)
         )
         return built
+
+    async def drape(
+        self,
+        pattern: Pattern,
+        bodies: Iterable[Collider],
+        textile: Textile,
+        *,
+        edge_m: float | None = None,
+        accuracy: Accuracy | None = None,
+        seconds: float = 20,
+    ) -> "Drape":
+        built = await self.build_garment(pattern, edge_m)
+        scene = calls.garment_scene(built, bodies, textile, accuracy)
+        session = await self.create_session(scene)
+        last = calls.frames_within((await session.get()).scene, seconds)
+        await session.run(until_rest=True, until_frame=last)
+        await session.wait()
+        mesh = MeshData.from_proto(built.sheet.triangles.data)
+        return Drape(session, await session.frame(), mesh, await session.verdict())
 
     async def run_test(
         self,
@@ -456,6 +477,15 @@ class Session:
 async def _write(stream: Any, request: Any) -> None:
     with contextlib.suppress(asyncio.InvalidStateError, grpc.RpcError):
         await stream.write(request)  # whoever reads is told why it has ended
+
+
+class Drape(NamedTuple):
+    """As weft.Drape."""
+
+    session: Session
+    frame: Frame
+    mesh: MeshData
+    verdict: session_pb2.Verdict
 
 
 class Hand:

@@ -1,7 +1,9 @@
 """What calls have in common, plain or awaited: how they are named, addressed and sent again."""
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import math
 import os
 import pathlib
 import re
@@ -13,8 +15,8 @@ import grpc
 
 from .errors import Error, InvalidArgument, Refusal, Violation, error
 from .frame import Frame, Parts, Reader
-from .scene import Action, BendingLaw, LabDirection, LabMesh, LabTest, MeshData, Pattern, Textile
-from .scene import action_proto
+from .scene import Accuracy, Action, BendingLaw, Collider, Dressing, LabDirection, LabMesh, LabTest
+from .scene import MeshData, Pattern, Scene, Sheet, SolverSettings, Textile, action_proto
 from .v1 import asset_pb2, asset_pb2_grpc, frame_pb2, frame_pb2_grpc, garment_pb2
 from .v1 import garment_pb2_grpc, lab_pb2, lab_pb2_grpc
 from .v1 import mesh_pb2, server_pb2, server_pb2_grpc, session_pb2, session_pb2_grpc
@@ -351,6 +353,24 @@ def test_request(
 
 def garment_request(pattern: Pattern, edge_m: float | None) -> garment_pb2.BuildGarmentRequest:
     return garment_pb2.BuildGarmentRequest(pattern=pattern.to_proto("pattern"), edge_m=edge_m)
+
+
+def garment_scene(
+    built: garment_pb2.BuildGarmentResponse,
+    bodies: Iterable[Collider],
+    textile: Textile,
+    accuracy: Accuracy | None,
+) -> Scene:
+    sheet = Sheet.from_proto(built.sheet)
+    if textile.damping_kg_per_s is None and textile.damping_ratio is None:
+        textile = dataclasses.replace(textile, damping_kg_per_s=2e-3)  # rests within some seconds
+    sheet.name, sheet.textile = "garment", textile
+    return Scene([sheet], list(bodies), solver=SolverSettings(accuracy=accuracy),
+                 cloth_contact=True, dressing=Dressing.from_proto(built.dressing))
+
+
+def frames_within(scene: Any, time_s: float) -> int:
+    return math.ceil(time_s / scene.solver.frame_step_s)
 
 
 def mesh_of(name: str, data: bytes) -> MeshData:

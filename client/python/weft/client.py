@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import queue
 import time
-from typing import Any, Callable, Generator, Iterable, Sequence
+from typing import Any, Callable, Generator, Iterable, NamedTuple, Sequence
 
 import grpc
 
@@ -13,8 +13,10 @@ from .errors import InvalidArgument, Refusal
 from .frame import Encoding, Frame, format_of, topology_of
 from .process import Process
 from .scene import (
+    Accuracy,
     Action,
     BendingLaw,
+    Collider,
     Drag,
     Grab,
     LabDirection,
@@ -192,6 +194,31 @@ class Server:
             calls.garment_request(pattern, edge_m)
         )
         return built
+
+    def drape(
+        self,
+        pattern: Pattern,
+        bodies: Iterable[Collider],
+        textile: Textile,
+        *,
+        edge_m: float | None = None,
+        accuracy: Accuracy | None = None,
+        seconds: float = 20,
+    ) -> "Drape":
+        """Puts a garment of measured textiles on bodies, and waits until it hangs at rest, for so
+        many simulated seconds at most.
+
+        Seams close around the bodies, then weight comes in, as `weft drape` has it. The session has
+        all frames from the flat panels on, and stays until it is deleted.
+        """
+        built = self.build_garment(pattern, edge_m)
+        scene = calls.garment_scene(built, bodies, textile, accuracy)
+        session = self.create_session(scene)
+        last = calls.frames_within((session.get()).scene, seconds)
+        session.run(until_rest=True, until_frame=last)
+        session.wait()
+        mesh = MeshData.from_proto(built.sheet.triangles.data)
+        return Drape(session, session.frame(), mesh, session.verdict())
 
     def run_test(
         self,
@@ -390,7 +417,8 @@ class Session:
         """Frames in order, each once, none left out, until the session stands still.
 
         They begin behind the last one that this object gave, or with the one at which it was made;
-        `start` and `end` name others. through_pauses waits where the session stands still.
+        `start` and `end` name others. With an `end`, or through_pauses, they wait where the session
+        stands still, until it goes on.
         A connection that breaks is made again, a server that was killed waited for, for a minute.
         Where the reader is slower, the session waits for it; with hold=False it does not, and
         FRAME_EXPIRED ends the stream once its next frame is no longer kept.
@@ -550,6 +578,21 @@ class Session:
     def snapshots(self) -> list[session_pb2.Snapshot]:
         """Its snapshots in order of frame."""
         return list(self.server.call(session_pb2.ListSnapshotsRequest(parent=self.name)).snapshots)
+
+
+class Drape(NamedTuple):
+    """A garment that was put on.
+
+    session  its frames, from the flat panels on
+    frame    the last one: `frame.positions` (n, 3), m
+    mesh     its triangles, their flat shape and its panels, as they were cut
+    verdict  whether it sits well, and what keeps it from that
+    """
+
+    session: Session
+    frame: Frame
+    mesh: MeshData
+    verdict: session_pb2.Verdict
 
 
 class Hand:

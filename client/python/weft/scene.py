@@ -343,6 +343,24 @@ class Collider(Value):
         """A closed surface: vertices (n, 3), m; faces (m, 3). `fields` are those of Collider."""
         return cls(BodyMesh(MeshData(vertices, faces), cell_m), **fields)
 
+    @classmethod
+    def load(
+        cls, path: str | os.PathLike[str], *, cell_m: float | None = None, **fields: Any
+    ) -> "Collider":
+        """The closed surface of an OBJ file in m, such as `weft body new -o body.obj` writes."""
+        lines = [line.split() for line in pathlib.Path(path).read_text().splitlines()]
+        vertices = [each[1:4] for each in lines if each[:1] == ["v"]]
+        faces = []
+        try:
+            for face in (each[1:] for each in lines if each[:1] == ["f"]):
+                corners = [int(corner.split("/")[0]) for corner in face]
+                corners = [each - 1 if each > 0 else len(vertices) + each for each in corners]
+                faces += [(corners[0], *pair) for pair in zip(corners[1:], corners[2:])]
+            corners_m = np.array(vertices, float).reshape(len(vertices), 3)
+            return cls.mesh(corners_m, faces, cell_m=cell_m, **fields)
+        except ValueError as wrong:
+            raise error("INVALID_ARGUMENT", "FILE_MALFORMED", f"{path}: {wrong}") from None
+
 
 @dataclass(eq=False)
 class Wind(Value):
@@ -510,6 +528,15 @@ class Pattern(Value):
     message = garment_pb2.Pattern
     panels: Sequence[PatternPanel]
     seams: Sequence[PatternSeam] = ()
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes a pattern file."""
+        pathlib.Path(path).write_text(self.to_json() + "\n")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> "Pattern":
+        """Reads a pattern file, such as `weft garment new` writes."""
+        return cls.from_json(pathlib.Path(path).read_text())
 
     def to_json(self) -> str:
         """What stands in a pattern file."""

@@ -1,5 +1,7 @@
 #include <gmock/gmock.h>
 
+#include <set>
+
 #include "tests/support/service/service.h"
 #include "weft/v1/garment.grpc.pb.h"
 
@@ -72,6 +74,9 @@ TEST(GarmentService, BuildsASheetThatCanBeSimulatedAndSaysWhichParticlesEdgesHav
   ASSERT_EQ(garment.edges_size(), 8);
   EXPECT_EQ(garment.edges(6).label(), "waist");
   EXPECT_DOUBLE_EQ(garment.edges(6).length_m(), 0.5);
+  ASSERT_EQ(garment.dressing().holds_size(), 1);
+  EXPECT_THAT(std::set(garment.edges(6).particles().begin(), garment.edges(6).particles().end()),
+              ::testing::ElementsAreArray(garment.dressing().holds(0).particles()));
   // the waist is closed, and the band's lower edge is the skirt's upper one
   EXPECT_EQ(*garment.edges(6).particles().begin(), *garment.edges(6).particles().rbegin());
   EXPECT_THAT(

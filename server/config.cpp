@@ -65,6 +65,8 @@ std::vector<Number> numbers(Config& config) {
       {"max_tests", &limits.max_tests, 1, 256, "Tests of textiles at a time"},
       {"history_bytes", &limits.history_bytes_per_session, kMiB, 1024 * kMiB * 64,
        "Bytes of frames a session keeps"},
+      {"max_total_history_bytes", &limits.max_total_history_bytes, kMiB, kMiB << 24,
+       "Bytes of frames all sessions keep; those that are\nread get more of them"},
       {"snapshot_ms", &server.snapshot_ms, 0, 3'600'000,
        "Milliseconds of computing between snapshots,\nat which restarts begin"},
   };

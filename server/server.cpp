@@ -9,6 +9,7 @@
 #include <array>
 #include <condition_variable>
 #include <functional>
+#include <limits>
 #include <mutex>
 #include <stdexcept>
 
@@ -91,11 +92,19 @@ void repeat(const std::stop_token& stop, std::chrono::milliseconds period,
 }
 
 constexpr std::chrono::minutes kLongestSweep{10};  // between two
+constexpr std::chrono::seconds kTrimInterval{1};
 
 void sweep(Backend& backend, std::chrono::milliseconds ttl) try {
   sweep_assets(backend, std::chrono::system_clock::now() - ttl);
 } catch (const StoreError& error) {
   spdlog::warn("assets that nothing uses stay: {}", error.what());
+}
+
+// Sessions that compute nothing keep more than their share when others come.
+void trim_histories(Backend& backend) {
+  if (!backend.history->exceeded()) return;
+  for (const auto& session : backend.registry.list("", std::numeric_limits<std::size_t>::max()))
+    session->trim_history();
 }
 
 }  // namespace
@@ -118,7 +127,7 @@ struct Server::Parts {
   GarmentService garments{backend};
   std::unique_ptr<grpc::Server> grpc;
   std::optional<Metrics> metrics;
-  std::jthread eviction, sweeping;
+  std::jthread eviction, sweeping, trimming;
   bool stopped = false;
 };
 
@@ -160,6 +169,8 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
     parts_->sweeping = std::jthread(
         repeat, std::min<std::chrono::milliseconds>(options.asset_ttl / 8, kLongestSweep),
         [backend = &parts_->backend, ttl = options.asset_ttl] { sweep(*backend, ttl); });
+  parts_->trimming = std::jthread(repeat, kTrimInterval,
+                                  [backend = &parts_->backend] { trim_histories(*backend); });
   for (const char* service : kServices) {
     parts_->grpc->GetHealthCheckService()->SetServingStatus(service, true);
   }

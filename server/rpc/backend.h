@@ -50,7 +50,7 @@ struct Backend {
   SessionHost host() {
     return {scheduler,
             stats,
-            static_cast<std::size_t>(limits.history_bytes_per_session),
+            history,
             [](const std::string& line) { spdlog::warn(line); },
             snapshot_after,
             static_cast<std::size_t>(limits.max_snapshots_per_session),
@@ -69,6 +69,9 @@ struct Backend {
   OpenCalls calls;
   Requests requests;
   Stats stats;
+  const std::shared_ptr<HistoryBudget> history =
+      std::make_shared<HistoryBudget>(static_cast<std::size_t>(limits.max_total_history_bytes),
+                                      static_cast<std::size_t>(limits.history_bytes_per_session));
   Scheduler scheduler;
   SlowCalls planner{"creations", "too many sessions are being created"};
   SlowCalls large_planner{"creations", "too many large sessions are being created"};

@@ -89,6 +89,8 @@ struct Metrics::Exposed : prometheus::Collectable {
                 "Sessions that came from another server or the store", stats.sessions_taken_over()),
         counter("weft_sessions_given_away_total",
                 "Sessions that went to another server or the store", stats.sessions_given_away()),
+        gauge("weft_history_bytes", "Bytes of the frames that sessions keep",
+              static_cast<double>(stats.history_bytes())),
         gauge("weft_assets", "Assets in the store", static_cast<double>(stats.assets())),
         gauge("weft_asset_bytes", "Bytes of all assets in the store",
               static_cast<double>(stats.asset_bytes())),

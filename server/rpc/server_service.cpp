@@ -23,6 +23,7 @@ grpc::ServerUnaryReactor* ServerService::GetServerInfo(grpc::CallbackServerConte
   limits->set_max_sessions(backend_.limits.max_sessions);
   limits->set_max_particles_per_session(backend_.limits.max_particles_per_session);
   limits->set_history_bytes_per_session(backend_.limits.history_bytes_per_session);
+  limits->set_max_total_history_bytes(backend_.limits.max_total_history_bytes);
   limits->set_max_streams(backend_.limits.max_streams);
   limits->set_max_request_bytes(backend_.limits.max_request_bytes);
   limits->set_max_frame_bytes(backend_.limits.max_frame_bytes);

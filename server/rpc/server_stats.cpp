@@ -53,6 +53,7 @@ v1::ServerStats server_stats(const Backend& backend) {
   result.set_asset_bytes(stats.asset_bytes);
   result.set_asset_bytes_received(stats.asset_bytes_received);
   result.set_asset_bytes_sent(stats.asset_bytes_sent);
+  result.set_history_bytes(static_cast<std::int64_t>(backend.history->meter()->bytes()));
   set(result.mutable_frame_time_s(), stats.frame_time);
   set(result.mutable_lateness_s(), stats.lateness);
   return result;

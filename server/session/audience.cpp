@@ -7,11 +7,18 @@
 namespace weft {
 
 void Audience::push(std::shared_ptr<const Frame> frame, Time now) {
+  history_.set_read(has_readers(now));
   history_.push(std::move(frame), first_held(now));
+}
+
+void Audience::trim(Time now) {
+  history_.set_read(has_readers(now));
+  history_.trim(first_held(now));
 }
 
 void Audience::add(FrameReader& reader) {
   readers_.push_back(&reader);
+  if (reader.policy != SlowReader::kSkip) history_.set_read(true);
   if (reader.policy == SlowReader::kHoldSession && absent_holders_ && --absent_holders_->count == 0)
     absent_holders_.reset();
   // where each begins says what has come to it

@@ -6,6 +6,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "server/session/history.h"
@@ -22,13 +23,15 @@ class Audience {
   using Time = Clock::time_point;
 
   // return_time: readers that are cut off come back within it, and find every frame again.
-  Audience(std::size_t history_bytes, std::chrono::duration<double> return_time)
-      : history_(history_bytes), return_time_(return_time) {}
+  Audience(std::shared_ptr<HistoryBudget> budget, std::chrono::duration<double> return_time)
+      : history_(std::move(budget)), return_time_(return_time) {}
 
   // The first frame, or one to go on from; what was kept before it is dropped.
   void begin(std::shared_ptr<const Frame> frame) { history_.begin(std::move(frame)); }
   // The next one.
   void push(std::shared_ptr<const Frame> frame, Time now);
+  // Drops frames that no longer fit.
+  void trim(Time now);
   const std::shared_ptr<const Frame>& newest() const { return history_.latest(); }
   std::int64_t latest() const { return newest()->number; }
   std::int64_t oldest() const { return history_.oldest(); }

@@ -10,15 +10,15 @@ std::shared_ptr<const void> EncodingCache::get(const std::string& key,
   if (const auto found = encodings_.find(key); found != encodings_.end()) return found->second;
   Encoding made = make();
   bytes_ += made.bytes;
-  if (meter_) *meter_ += made.bytes;
+  if (meter_) meter_->add(made.bytes);
   return encodings_.emplace(key, std::move(made.data)).first->second;
 }
 
-void EncodingCache::count_in(ByteMeter meter) const {
+void EncodingCache::count_in(std::shared_ptr<ByteMeter> meter) const {
   std::lock_guard lock(mutex_);
-  if (meter_) *meter_ -= bytes_;
+  if (meter_) meter_->remove(bytes_);
   meter_ = std::move(meter);
-  if (meter_) *meter_ += bytes_;
+  if (meter_) meter_->add(bytes_);
 }
 
 }  // namespace weft

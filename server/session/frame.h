@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "core/simulation.h"
+#include "server/session/history_budget.h"
 
 namespace weft {
 
@@ -20,9 +20,6 @@ struct Encoding {
   std::size_t bytes = 0;
 };
 
-// Bytes held by many objects together.
-using ByteMeter = std::shared_ptr<std::atomic<std::size_t>>;
-
 // Encodings of one frame: each made once for all watchers, and gone with the frame.
 class EncodingCache {
  public:
@@ -31,13 +28,13 @@ class EncodingCache {
                                   const std::function<Encoding()>& make) const;
 
   // Counts the bytes of every encoding, those to come too, in `meter`; nullptr: nowhere any more.
-  void count_in(ByteMeter meter) const;
+  void count_in(std::shared_ptr<ByteMeter> meter) const;
 
  private:
   mutable std::mutex mutex_;
   mutable std::map<std::string, std::shared_ptr<const void>> encodings_;
   mutable std::size_t bytes_ = 0;
-  mutable ByteMeter meter_;
+  mutable std::shared_ptr<ByteMeter> meter_;
 };
 
 // The state of a session at one time. Never changes once it is published.

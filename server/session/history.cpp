@@ -5,10 +5,21 @@
 
 namespace weft {
 
-History::History(std::size_t max_bytes) : max_bytes_(max_bytes) {}
+History::History(std::shared_ptr<HistoryBudget> budget)
+    : budget_(std::move(budget)), bytes_(std::make_shared<ByteMeter>(budget_->meter())) {
+  budget_->add(read_);
+}
 
 History::~History() {
   while (!frames_.empty()) drop_oldest();
+  budget_->remove(read_);
+}
+
+void History::set_read(bool read) {
+  if (read == read_) return;
+  budget_->add(read);
+  budget_->remove(read_);
+  read_ = read;
 }
 
 void History::begin(std::shared_ptr<const Frame> frame) {
@@ -18,14 +29,19 @@ void History::begin(std::shared_ptr<const Frame> frame) {
 
 void History::push(std::shared_ptr<const Frame> frame, std::int64_t keep_from) {
   assert(frames_.empty() || frame->number == latest()->number + 1);
-  frame_bytes_ += frame->bytes();
-  frame->encodings.count_in(encoding_bytes_);
+  bytes_->add(frame->bytes());
+  frame->encodings.count_in(bytes_);
   frames_.push_back(std::move(frame));
-  while (frames_.size() > 2 && bytes() > max_bytes_ && oldest() < keep_from) drop_oldest();
+  trim(keep_from);
+}
+
+void History::trim(std::int64_t keep_from) {
+  const std::size_t share = budget_->share(read_);
+  while (frames_.size() > 2 && bytes_->bytes() > share && oldest() < keep_from) drop_oldest();
 }
 
 bool History::full() const {
-  return frames_.size() >= 2 && bytes() + latest()->bytes() > max_bytes_;
+  return frames_.size() >= 2 && bytes_->bytes() + latest()->bytes() > budget_->share(read_);
 }
 
 std::shared_ptr<const Frame> History::find(std::int64_t number) const {
@@ -34,7 +50,7 @@ std::shared_ptr<const Frame> History::find(std::int64_t number) const {
 }
 
 void History::drop_oldest() {
-  frame_bytes_ -= frames_.front()->bytes();
+  bytes_->remove(frames_.front()->bytes());
   frames_.front()->encodings.count_in(nullptr);
   frames_.pop_front();
 }

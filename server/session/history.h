@@ -6,23 +6,29 @@
 #include <memory>
 
 #include "server/session/frame.h"
+#include "server/session/history_budget.h"
 
 namespace weft {
 
-// The newest frames of a session: consecutive, bounded by bytes, at least two once there are two.
-// Not thread-safe.
+// The newest frames of a session: consecutive, as many as its share of a budget holds with their
+// encodings, at least two once there are two. Not thread-safe.
 class History {
  public:
-  explicit History(std::size_t max_bytes);
+  explicit History(std::shared_ptr<HistoryBudget> budget);
   ~History();
   History(const History&) = delete;
   History& operator=(const History&) = delete;
+
+  // Whether somebody reads it; nobody at first.
+  void set_read(bool read);
 
   // Drops all frames; the next one is this.
   void begin(std::shared_ptr<const Frame> frame);
 
   // Adds the next frame and drops the oldest ones that no longer fit, but none from `keep_from` on.
   void push(std::shared_ptr<const Frame> frame, std::int64_t keep_from);
+  // Drops the oldest ones that no longer fit, for others have come.
+  void trim(std::int64_t keep_from);
 
   // Whether one more frame would drop the oldest.
   bool full() const;
@@ -35,12 +41,11 @@ class History {
   const std::shared_ptr<const Frame>& latest() const { return frames_.back(); }
 
  private:
-  std::size_t bytes() const { return frame_bytes_ + *encoding_bytes_; }
   void drop_oldest();
 
-  std::size_t max_bytes_;
-  std::size_t frame_bytes_ = 0;
-  ByteMeter encoding_bytes_ = std::make_shared<std::atomic<std::size_t>>(0);
+  const std::shared_ptr<HistoryBudget> budget_;
+  bool read_ = false;
+  const std::shared_ptr<ByteMeter> bytes_;  // of frames and encodings
   std::deque<std::shared_ptr<const Frame>> frames_;
 };
 

@@ -2,6 +2,8 @@
 
 #include <cstdint>
 
+#include "server/session/memory.h"
+
 namespace weft {
 
 // What a server accepts. Published in GetServerInfo.
@@ -13,7 +15,8 @@ struct Limits {
   std::int64_t max_frame_work = 1'000'000'000;    // particles x substeps
   std::int64_t max_particles_per_principal = 1'000'000'000;
   std::int64_t history_bytes_per_session = 64 << 20;  // frames with their encodings
-  std::int64_t max_streams = 1024;                    // but tests of textiles
+  std::int64_t max_total_history_bytes = memory_there_is() / 4;
+  std::int64_t max_streams = 1024;  // but tests of textiles
   std::int64_t max_streams_per_principal = 100'000;
   std::int64_t max_snapshots_per_session = 16;  // on demand
   std::int64_t max_tests = 8;                   // that run or wait

@@ -50,7 +50,7 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
       scene_(timeline_.simulation.scene()),
       particle_count_(count_particles(scene_)),
       journal_(host.limit_interval, scene_.solver.frame_step),
-      audience_(host.history_bytes, host.return_time),
+      audience_(host.history, host.return_time),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(timeline_.simulation.plan())) {
   audience_.begin(timeline_.make_frame({}));
@@ -310,6 +310,11 @@ void Session::submit(Command command) {
   } else {
     wake();
   }
+}
+
+void Session::trim_history() {
+  std::lock_guard lock(mutex_);
+  audience_.trim(Clock::now());
 }
 
 bool Session::evict(std::chrono::duration<double> unused) {

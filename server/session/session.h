@@ -76,7 +76,7 @@ using Notify = std::function<void(const std::string& line)>;
 struct SessionHost {
   Scheduler& scheduler;
   Stats& stats;
-  std::size_t history_bytes;  // at least two frames are kept, more as long as they fit
+  std::shared_ptr<HistoryBudget> history;
   Notify notify = {};
   // Computing between two snapshots; a session of more than 20 000 particles has them more rarely.
   std::chrono::duration<double> snapshot_after{2};
@@ -142,6 +142,9 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   // Frames from `start` on, by default from the newest.
   std::unique_ptr<Subscription> subscribe(std::weak_ptr<FrameSink> sink,
                                           std::optional<std::int64_t> start, SlowReader policy);
+
+  // Drops frames that do not fit into its share of the history any more.
+  void trim_history();
 
   // Ends it as one that is with no server now, where it is paused and was not used for so long;
   // false where it is not so.

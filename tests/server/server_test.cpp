@@ -285,6 +285,7 @@ TEST(Config, HelpsWithEveryFlag) {
                            "--max-total-asset-bytes",
                            "--asset-ttl-s",
                            "--history-bytes",
+                           "--max-total-history-bytes",
                            "--log-level"}) {
     EXPECT_THAT(help, HasSubstr(flag));
   }

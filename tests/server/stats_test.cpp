@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include "tests/support/service/service.h"
 
@@ -48,6 +49,22 @@ TEST(ServerStats, CountWhatWasComputedAndSent) {
   std::int64_t timed = 0;
   for (const std::int64_t count : stats.frame_time_s().counts()) timed += count;
   EXPECT_EQ(timed, 10);
+}
+
+TEST(ServerStats, SayWhatFramesTakeWhichAllSessionsTogetherKeepWithinTheirBound) {
+  ServerOptions options = Service::in_process();
+  options.limits.max_total_history_bytes = 400'000;  // some 350 frames of the small scene
+  Service service(options);
+  const auto kept = [&] { return stats_of(service).history_bytes(); };
+  const v1::Session first = service.create();
+  service.step(first, 1000);
+  EXPECT_GT(kept(), 390'000);
+  EXPECT_LE(kept(), 400'000);
+  // it makes room when others come, though nobody calls it any more
+  for (int i = 0; i < 3; ++i) service.step(service.create(), 1000);
+  while (kept() > 400'000) std::this_thread::sleep_for(10ms);
+  EXPECT_GT(kept(), 390'000);
+  EXPECT_THAT(Stream(service, frames_of(first, 980, 1000)).rest(), ::testing::SizeIs(21));
 }
 
 TEST(ServerStats, CountOpenStreams) {

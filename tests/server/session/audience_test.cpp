@@ -5,6 +5,8 @@
 #include <chrono>
 #include <memory>
 
+#include "tests/server/session/session_support.h"
+
 namespace weft {
 namespace {
 
@@ -29,7 +31,7 @@ class AudienceTest : public ::testing::Test {
 
   static constexpr std::size_t kKept = 10;
   Clock::time_point now_ = Clock::now();
-  Audience audience_{kKept * frame(0)->bytes(), seconds(60)};
+  Audience audience_{testing::history_for(kKept * frame(0)->bytes()), seconds(60)};
 };
 
 TEST_F(AudienceTest, AReaderFindsEveryFrameOnceAndThenNone) {

@@ -19,8 +19,17 @@ std::shared_ptr<const Frame> frame(std::int64_t number) {
 
 const std::size_t kFrameBytes = frame(0)->bytes();
 
+// For so many frames, of all and of each.
+std::shared_ptr<HistoryBudget> budget(std::size_t frames) {
+  return std::make_shared<HistoryBudget>(frames * kFrameBytes, frames * kFrameBytes);
+}
+
+std::size_t kept(const History& history) {
+  return static_cast<std::size_t>(history.latest()->number - history.oldest() + 1);
+}
+
 TEST(History, DropsTheOldestFramesThatDoNotFit) {
-  History history(5 * kFrameBytes);
+  History history(budget(5));
   for (int i = 0; i < 100; ++i) history.push(frame(i), kKeepNone);
   EXPECT_EQ(history.oldest(), 95);
   EXPECT_EQ(history.latest()->number, 99);
@@ -30,20 +39,20 @@ TEST(History, DropsTheOldestFramesThatDoNotFit) {
 }
 
 TEST(History, KeepsTwoFramesHoweverLargeTheyAre) {
-  History history(1);
+  History history(budget(0));
   for (int i = 0; i < 5; ++i) history.push(frame(i), kKeepNone);
   EXPECT_EQ(history.oldest(), 3);
   EXPECT_TRUE(history.full());
 }
 
 TEST(History, KeepsWhatItIsAskedToKeep) {
-  History history(3 * kFrameBytes);
+  History history(budget(3));
   for (int i = 0; i < 10; ++i) history.push(frame(i), 4);
   EXPECT_EQ(history.oldest(), 4);
 }
 
 TEST(History, CountsTheEncodingsOfItsFrames) {
-  History history(5 * kFrameBytes);
+  History history(budget(5));
   for (int i = 0; i < 5; ++i) history.push(frame(i), kKeepNone);
   EXPECT_EQ(history.oldest(), 0);
   history.latest()->encodings.get("0", [] {
@@ -51,6 +60,31 @@ TEST(History, CountsTheEncodingsOfItsFrames) {
   });
   history.push(frame(5), kKeepNone);
   EXPECT_EQ(history.oldest(), 3) << "two frames of room went to the encoding";
+}
+
+TEST(History, SharesABudgetOfWhichThoseThatAreReadGetFourTimesAsMuch) {
+  const auto shared = budget(20);
+  History first(shared);
+  for (int i = 0; i < 50; ++i) first.push(frame(i), kKeepNone);
+  EXPECT_EQ(kept(first), 20U);
+  {
+    History second(shared);
+    for (int i = 0; i < 50; ++i) second.push(frame(i), kKeepNone);
+    EXPECT_EQ(kept(second), 10U);
+    EXPECT_TRUE(shared->exceeded()) << "the first one has not made room yet";
+    first.trim(kKeepNone);
+    EXPECT_EQ(kept(first), 10U);
+    EXPECT_FALSE(shared->exceeded());
+
+    second.set_read(true);
+    first.trim(kKeepNone);
+    for (int i = 50; i < 99; ++i) second.push(frame(i), kKeepNone);
+    EXPECT_EQ(kept(first), 4U);
+    EXPECT_EQ(kept(second), 16U);
+    EXPECT_EQ(shared->meter()->bytes(), 20 * kFrameBytes);
+  }
+  for (int i = 50; i < 99; ++i) first.push(frame(i), kKeepNone);
+  EXPECT_EQ(kept(first), 20U) << "what the other one had is free again";
 }
 
 TEST(EncodingCache, MakesEachEncodingOnceAndLetsItGoWithTheFrame) {

@@ -123,7 +123,7 @@ class DiskLog : public SessionLog {
 class SessionLogTest : public ::testing::Test {
  protected:
   SessionHost host(std::size_t history_bytes = kMuchHistory) {
-    return {scheduler_, stats(), history_bytes};
+    return {scheduler_, stats(), history_for(history_bytes)};
   }
   static std::shared_ptr<Session> make(const std::shared_ptr<Disk>& disk, const SessionHost& host) {
     return std::make_shared<Session>(make_identity("test", "test"), Simulation(hung_scene()), host,

@@ -42,10 +42,14 @@ Stats& stats() {
   return all;
 }
 
+std::shared_ptr<HistoryBudget> history_for(std::size_t bytes) {
+  return std::make_shared<HistoryBudget>(bytes, bytes);
+}
+
 std::shared_ptr<Session> make_session(Scheduler& scheduler, const Scene& scene,
                                       std::size_t history_bytes, const std::string& id) {
   return std::make_shared<Session>(make_identity(id, "test"), Simulation(scene),
-                                   SessionHost{scheduler, stats(), history_bytes},
+                                   SessionHost{scheduler, stats(), history_for(history_bytes)},
                                    std::make_unique<NoLog>());
 }
 

@@ -23,6 +23,9 @@ Stats& stats();
 
 constexpr std::size_t kMuchHistory = 64 << 20;
 
+// A history for one session.
+std::shared_ptr<HistoryBudget> history_for(std::size_t bytes);
+
 std::shared_ptr<Session> make_session(Scheduler& scheduler, const Scene& scene = hung_scene(),
                                       std::size_t history_bytes = kMuchHistory,
                                       const std::string& id = "test");

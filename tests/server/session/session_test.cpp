@@ -506,7 +506,7 @@ TEST(Session, RepairsAFaultInTheMiddleOfARunAndTellsOfIt) {
       Simulation(hung_scene(),
                  faulty_solvers(
                      {.frame = 7, .times = 2, .jump = std::numeric_limits<double>::quiet_NaN()})),
-      SessionHost{scheduler, stats(), kMuchHistory,
+      SessionHost{scheduler, stats(), history_for(kMuchHistory),
                   [&](const std::string& line) {
                     std::lock_guard lock(mutex);
                     lines.push_back(line);
@@ -536,7 +536,7 @@ TEST(Session, FailsWhenRepairsAreUsedUpWithItsLastGoodFrameReadable) {
   const auto session = std::make_shared<Session>(
       make_identity("test", "test"),
       Simulation(scene, faulty_solvers({.frame = 7, .times = 1000, .jump = 1e300})),
-      SessionHost{scheduler, stats(), kMuchHistory}, std::make_unique<NoLog>());
+      SessionHost{scheduler, stats(), history_for(kMuchHistory)}, std::make_unique<NoLog>());
   const auto watcher = Watcher::of(*session, 1);
   EXPECT_EQ(step(*session, 20).refused(), Refusal::Why::kFailed);
   const SessionStatus status = session->status();

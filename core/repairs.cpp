@@ -1,5 +1,6 @@
 #include "core/repairs.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace weft {
@@ -20,6 +21,24 @@ void Repairs::set(int halvings, int instead_of, StepPlan& step) const {
   step.substep = frame_step_ / static_cast<double>(step.substeps);
 }
 
+bool Repairs::grow(std::int64_t frame, StepPlan& step) {
+  constexpr std::int64_t kGood = 64;
+  constexpr int kMostDoublings = 10;
+  int lasting = 0, times = 0;
+  std::int64_t last = 0;
+  for (const Repair& repair : all_) {
+    lasting += repair.lasts ? 1 : 0;
+    times += repair.frame == last ? 0 : 1;
+    last = repair.frame;
+  }
+  if (halvings_ <= lasting || 2 * step.substep > step.linear_bound) return false;
+  const std::int64_t good = frame - 1 - last;
+  if (good == 0 || good % (kGood << std::min(times - 1, kMostDoublings)) != 0) return false;
+  set(halvings_ - 1, halvings_, step);
+  --halvings_;
+  return true;
+}
+
 void Repairs::begin_frame() {
   doubtful_.reset();
   halvings_before_ = halvings_;
@@ -34,16 +53,21 @@ Decision Repairs::judge(std::int64_t frame, const Attempt& made, StepPlan& step)
     all_.resize(repairs_before_ + static_cast<std::size_t>(halvings_ - halvings_before_));
     return Decision::kConfirmed;
   }
-  if (!halve(frame, made.reason, step)) return Decision::kImpossible;
+  if (!halve({.frame = frame, .reason = made.reason}, step)) return Decision::kImpossible;
   doubtful_ = made;
   return Decision::kAgain;
 }
 
-bool Repairs::halve(std::int64_t frame, const std::string& reason, StepPlan& step) {
+bool Repairs::keep_halved(std::int64_t frame, const std::string& reason, StepPlan& step) {
+  return halve({.frame = frame, .reason = reason, .lasts = true}, step);
+}
+
+bool Repairs::halve(Repair repair, StepPlan& step) {
   if (halvings_ >= most_ || 2 * step.substeps > most_substeps_) return false;
   set(halvings_ + 1, halvings_, step);
   ++halvings_;
-  all_.push_back({frame, step.substep, reason});
+  repair.substep = step.substep;
+  all_.push_back(std::move(repair));
   return true;
 }
 

@@ -10,11 +10,12 @@
 
 namespace weft {
 
-// A frame that had to be computed again with half the step, which then stays.
+// A frame that had to be computed again with half the step.
 struct Repair {
   std::int64_t frame = 0;
   double substep = 0;  // from then on, s
   std::string reason;
+  bool lasts = false;  // the step is not doubled again, see Repairs::grow()
 };
 
 // What the guard says of an attempt at a frame.
@@ -50,13 +51,17 @@ class Repairs {
   // A plan made anew, without what was halved.
   void shorten(StepPlan& step) const { set(halvings_, 0, step); }
 
+  // Doubles a halved step again, up to its bound, after a while without repairs: 64 frames, and
+  // twice as many for each time that frames broke before.
+  [[nodiscard]] bool grow(std::int64_t frame, StepPlan& step);
   void begin_frame();
   // Says what follows from an attempt at a frame, and sets the step for it.
   Decision judge(std::int64_t frame, const Attempt& made, StepPlan& step);
-  // Halves the step; false: that is not possible any more.
-  bool halve(std::int64_t frame, const std::string& reason, StepPlan& step);
+  // Halves the step for good; false: that is not possible any more.
+  bool keep_halved(std::int64_t frame, const std::string& reason, StepPlan& step);
 
  private:
+  bool halve(Repair repair, StepPlan& step);
   // Substeps are doubled so many times instead of so many.
   void set(int halvings, int instead_of, StepPlan& step) const;
 

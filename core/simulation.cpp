@@ -93,6 +93,7 @@ bool Simulation::State::begin_frame(bool in_parts) {
   if (in_parts && plan.step.substeps >= kWorthSaving) before = snapshot();
   if (!change_dressing() || !change_textiles()) return false;
   for (const MovingSheet& sheet : sheets) sheet.good();  // to go back to, and to show
+  if (repairs.grow(frame + 1, plan.step)) begin_again();
   repairs.begin_frame();
   unfinished = {0, std::move(before)};
   return true;
@@ -123,9 +124,7 @@ Decision Simulation::State::repair(const Attempt& made, NextStates& next) {
   const Decision decision = repairs.judge(frame + 1, made, plan.step);
   if (decision == Decision::kAgain) {
     unfinished->substeps = 0;
-    for (MovingSheet& sheet : sheets)
-      sheet.solver->start(sheet.good().x, sheet.good().v, time(), plan.step.substep);
-    forget_motion();
+    begin_again();
   } else if (decision == Decision::kConfirmed) {
     for (std::size_t s = 0; s < sheets.size(); ++s)
       sheets[s].most_strain = std::max(sheets[s].most_strain, 2 * made.sheets[s].strain);
@@ -134,6 +133,13 @@ Decision Simulation::State::repair(const Attempt& made, NextStates& next) {
     fail("computed", made.reason);
   }
   return decision;
+}
+
+// Solvers begin at the end of the last frame with the step as it now is.
+void Simulation::State::begin_again() {
+  for (MovingSheet& sheet : sheets)
+    sheet.solver->start(sheet.good().x, sheet.good().v, time(), plan.step.substep);
+  forget_motion();
 }
 
 // Solvers go on from the end of the frame with the step as it now is.
@@ -178,7 +184,7 @@ bool Simulation::State::keep_to_budget(NextStates& next) {
     if (reason.empty() && !why.empty()) reason = definition.name + ": " + why;
   }
   if (reason.empty()) return true;
-  if (!repairs.halve(frame + 1, reason, plan.step)) return fail("trusted", reason);
+  if (!repairs.keep_halved(frame + 1, reason, plan.step)) return fail("trusted", reason);
   restart_from(next);
   for (MovingSheet& sheet : sheets) sheet.budget = {};
   return true;

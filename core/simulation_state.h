@@ -68,6 +68,7 @@ struct Simulation::State {
   void step(double time, double dt, bool ends_frame, ThreadPool& pool);
   Attempt inspect_sheets(NextStates& next);
   Decision repair(const Attempt& made, NextStates& next);
+  void begin_again();
   void restart_from(NextStates& next);
   void forget_motion();
   bool keep_to_budget(NextStates& next);

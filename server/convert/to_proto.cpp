@@ -360,6 +360,7 @@ v1::Repair to_proto(const Repair& repair) {
   result.set_frame(repair.frame);
   result.set_substep_s(repair.substep);
   result.set_reason(repair.reason);
+  result.set_lasts(repair.lasts);
   return result;
 }
 

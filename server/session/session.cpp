@@ -151,10 +151,9 @@ void Session::end_frame(FramePart part, Clock::time_point due) {
     if (closed_) return;
     const auto end = used_ = Clock::now();
     audience_.push(frame, end);
-    if (simulation.textile_changed()) {
-      textiles_ = textiles_of(simulation.scene());
+    if (simulation.textile_changed()) textiles_ = textiles_of(simulation.scene());
+    if (simulation.textile_changed() || simulation.plan().step.substeps != plan_->step.substeps)
       plan_ = std::make_shared<const Plan>(simulation.plan());
-    }
     lateness_ = {};
     if (due != Clock::time_point::min()) {
       lateness_ = end - due;

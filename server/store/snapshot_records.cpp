@@ -190,7 +190,7 @@ SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes
   simulation.halvings = from.halvings();
   simulation.plan = *plans.front();
   for (const auto& each : from.repairs())
-    simulation.repairs.push_back({each.frame(), each.substep_s(), each.reason()});
+    simulation.repairs.push_back({each.frame(), each.substep_s(), each.reason(), each.lasts()});
   for (const auto& each : from.sheets()) {
     simulation.sheets.push_back({textile_of(each.textile()), each.most_strain(),
                                  columns_of(each.positions_m()),

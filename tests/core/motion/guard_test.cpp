@@ -43,11 +43,45 @@ TEST(Guard, AFaultThatPassesCostsOneRepairAndTheFramesGoOnAsWithoutIt) {
     ASSERT_THAT(hit.repairs(), SizeIs(1));
     EXPECT_EQ(hit.repairs()[0].frame, 5);
     EXPECT_EQ(hit.repairs()[0].substep, sound.plan().step.substep / 2);
-    EXPECT_EQ(hit.plan().step.substeps, 2 * sound.plan().step.substeps) << "the step stays halved";
+    EXPECT_EQ(hit.plan().step.substeps, 2 * sound.plan().step.substeps)
+        << "the step stays halved for a while";
     // apart by the error of the longer step, far below the 0.2 m the sheet has fallen
     EXPECT_LT((positions(hit) - positions(sound)).cwiseAbs().maxCoeff(), 1e-3);
     EXPECT_THAT(sound.repairs(), IsEmpty());
   }
+}
+
+TEST(Guard, TheStepGrowsAgainAfterGoodFramesTwiceAsManyEachTimeFramesBreak) {
+  const Scene scene = hung();
+  const std::int64_t planned = Simulation(scene).plan().step.substeps;
+  Simulation simulation(scene, faulty_solvers({.frame = 5, .times = 2, .jump = kNan}));
+  const auto substeps_at = [&](std::int64_t frame) {
+    while (simulation.frame() < frame) EXPECT_TRUE(simulation.advance_frame());
+    return simulation.substeps();
+  };
+  EXPECT_EQ(substeps_at(4), planned);
+  EXPECT_EQ(substeps_at(69), 4 * planned);
+  EXPECT_EQ(substeps_at(70), 2 * planned);
+  const Snapshot snapshot = simulation.snapshot();
+  EXPECT_EQ(substeps_at(133), 2 * planned);
+  EXPECT_EQ(substeps_at(134), planned);
+  EXPECT_EQ(substeps_at(300), planned);
+  EXPECT_THAT(simulation.repairs(), SizeIs(2)) << "growing is none";
+
+  Simulation restored(scene);
+  ASSERT_TRUE(restored.restore(snapshot));
+  while (restored.frame() < 300) ASSERT_TRUE(restored.advance_frame());
+  EXPECT_EQ(positions(restored), positions(simulation));
+
+  Repairs repairs(scene.solver);
+  StepPlan step = simulation.plan().step;
+  repairs.adopt(2, {{5, 0, "", false}, {90, 0, "", false}});
+  EXPECT_FALSE(repairs.grow(90 + 64 + 1, step));
+  EXPECT_FALSE(repairs.grow(90 + 128 + 1, step)) << "twice the planned step is above its bound";
+  step.substep /= 4;
+  EXPECT_TRUE(repairs.grow(90 + 128 + 1, step));
+  repairs.adopt(1, {{5, 0, "", true}});
+  EXPECT_FALSE(repairs.grow(5 + 64 + 1, step)) << "where energy came from nothing it stays";
 }
 
 TEST(Guard, AFaultThatComesBackEndsTheRunWithTheLastGoodFrameReadable) {

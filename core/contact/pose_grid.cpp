@@ -25,6 +25,7 @@ class PoseGridMaker {
 
   PoseGrid make() {
     find_nearest();
+    known_.reserve(scanned_.size() * ScannedBlock::kCorners);
     for (std::size_t i = 0; i < scanned_.size(); ++i) finish(scanned_[i], places_[i]);
     count_steps();
     lay_values();
@@ -61,6 +62,7 @@ class PoseGridMaker {
   // Of every corner that one may be nearer to than the band.
   void find_nearest() {
     std::vector<ScannedTriangle> triangles;
+    triangles.reserve(mesh_.triangles.size());
     begin_.assign(blocks(), -1);
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
       const auto [i, j, k] = mesh_.triangles[t];
@@ -70,6 +72,10 @@ class PoseGridMaker {
       each.corner = a;
       each.ab = b - a;
       each.ac = c - a;
+      each.middle = (a + b + c) / 3;
+      each.reach = band_ + std::sqrt(std::max({(a - each.middle).squaredNorm(),
+                                               (b - each.middle).squaredNorm(),
+                                               (c - each.middle).squaredNorm()}));
       const Vector3d least = a.cwiseMin(b).cwiseMin(c), most = a.cwiseMax(b).cwiseMax(c);
       for (Eigen::Index axis = 0; axis < 3; ++axis) {
         const double low = made_.distances.low[axis];
@@ -78,6 +84,11 @@ class PoseGridMaker {
         each.last[n] = static_cast<int>(std::floor((most[axis] + band_ - low) / cell_));
       }
       claim_blocks(each);
+    }
+    scanned_.resize(places_.size());
+    for (ScannedBlock& block : scanned_) {
+      std::fill_n(block.squared, ScannedBlock::kCorners, std::numeric_limits<float>::infinity());
+      std::fill_n(block.triangle, ScannedBlock::kCorners, -1);
     }
     scan(triangles, made_.distances.low, cell_, counts_, begin_, scanned_);
   }
@@ -94,11 +105,7 @@ class PoseGridMaker {
           const Vector3d middle = place(corner(at, {0, 0, 0})).array() + (kCells - 1) * cell_ / 2;
           if (begin >= 0 || std::abs((middle - t.corner).dot(normal)) > band_ + half_diagonal)
             continue;
-          begin = static_cast<std::int32_t>(scanned_.size());
-          ScannedBlock& block = scanned_.emplace_back();
-          std::fill_n(block.squared, ScannedBlock::kCorners,
-                      std::numeric_limits<float>::infinity());
-          std::fill_n(block.triangle, ScannedBlock::kCorners, -1);
+          begin = static_cast<std::int32_t>(places_.size());
           places_.push_back(at);
         }
   }

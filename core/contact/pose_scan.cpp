@@ -50,6 +50,7 @@ void scan_all(std::span<const ScannedTriangle> triangles, const Vector3d& low, d
   const hn::RebindToSigned<LayerTag> ints;
   const int lanes = static_cast<int>(hn::Lanes(tag));
   const Floats zero = floats(0.0), one = floats(1.0);
+  const Vector3d to_middle = (kBlock - 1) * cell / 2 * Vector3d(1, 1, 0);  // of a layer
   alignas(64) float along_x[kLayer], along_y[kLayer];
   for (int i = 0; i < kLayer; ++i) {
     along_x[i] = static_cast<float>(i % kBlock * cell);
@@ -66,6 +67,7 @@ void scan_all(std::span<const ScannedTriangle> triangles, const Vector3d& low, d
     const Edge ab = edge_to(t.ab), ac = edge_to(t.ac), bc = edge_to(t.ac - t.ab);
     const Points b = floats(t.ab);
     const auto number = hn::Set(ints, t.number);
+    const double most = t.reach + to_middle.norm();
 
     for (int z = t.first[2]; z <= t.last[2]; ++z) {
       for (int y = t.first[1] / kBlock; y <= t.last[1] / kBlock; ++y) {
@@ -73,8 +75,10 @@ void scan_all(std::span<const ScannedTriangle> triangles, const Vector3d& low, d
           const std::int32_t index =
               begin[static_cast<std::size_t>((z / kBlock * counts[1] + y) * counts[0] + x)];
           if (index < 0) continue;
+          const Vector3d first = low + cell * Vector3d(x * kBlock, y * kBlock, z);
+          if ((first + to_middle - t.middle).squaredNorm() > most * most) continue;
           ScannedBlock& block = blocks[static_cast<std::size_t>(index)];
-          const Points from = floats(low + cell * Vector3d(x * kBlock, y * kBlock, z) - t.corner);
+          const Points from = floats(first - t.corner);
           for (int lane = 0; lane < kLayer; lane += lanes) {
             const Points p{hn::Add(from.x, hn::Load(tag, along_x + lane)),
                            hn::Add(from.y, hn::Load(tag, along_y + lane)), from.z};

@@ -26,6 +26,8 @@ struct ScannedTriangle {
   std::int32_t number = 0;
   std::array<int, 3> first{}, last{};  // in cells
   Vector3d corner, ab, ac;             // m
+  Vector3d middle;                     // of a ball around it, m
+  double reach = 0;                    // from there to what is near it, m
 };
 
 // Every corner of a layer that has one of them meets each triangle, in order. begin: of each block

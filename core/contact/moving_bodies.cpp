@@ -119,7 +119,8 @@ std::shared_ptr<const PoseGrid> MovingBodies::grid(Moving& moving, At at) {
 }
 
 double least_pose_cell(const Poses& poses, const std::vector<std::array<int, 3>>& triangles) {
-  constexpr double kMostSquares = 9e5, kMostBlocks = 2e6, kMostScanned = 1e8;
+  // a surface of so many squares of a cell has grids of some 80 MB
+  constexpr double kMostSquares = 2e5, kMostBlocks = 2e6, kMostScanned = 1e8;
   double least = 0;
   for (std::size_t p = 0; p < poses.times.size(); ++p) {
     Eigen::AlignedBox3d all;

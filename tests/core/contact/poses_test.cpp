@@ -262,6 +262,16 @@ TEST(Poses, WakeASheetThatLiesStillOnlyAsLongAsTheyChange) {
   EXPECT_NEAR(positions(simulation)(1, 12), 0.01 + 1e-3, 1e-5);
 }
 
+TEST(Poses, HaveCellsThatTheirLargestOneCanBear) {
+  const Collider ball = posed(ball_mesh(0.1, 2), {0, 1}, [](const Vector3d& v, double time) {
+    return Vector3d(v * (1 + 9 * time));
+  });
+  const auto& triangles = std::get<SharedBody>(ball.shape)->mesh.triangles;
+  const double least = least_pose_cell(*ball.poses, triangles);
+  EXPECT_NEAR(4 * std::numbers::pi / (least * least), 2e5,
+              2e4);  // squares of a cell on its surface
+}
+
 std::string fault(const Poses& poses, std::size_t vertices) {
   const auto problems = find_problems(poses, vertices, "poses");
   return problems.empty() ? "" : problems[0].field + ": " + problems[0].message;

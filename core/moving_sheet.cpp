@@ -98,7 +98,10 @@ double end_of_motion(const Scene& scene) {
   };
   for (const SheetDefinition& sheet : scene.sheets)
     for (const Pin& pin : sheet.pins) include(pin.path);
-  for (const Collider& collider : scene.colliders) include(collider.path);
+  for (const Collider& collider : scene.colliders) {
+    include(collider.path);
+    if (collider.poses) end = std::max(end, collider.poses->times.back());
+  }
   return end;
 }
 

@@ -314,7 +314,7 @@ void warn_of_body(const Scene& scene, std::size_t index, const Body& body, Plan&
               " m thick, less than two of its cells of ", body.grid.cell,
               " m: so thin a part holds cloth only from its edges, or not at all. Give a smaller "
               "cell_m")});
-  const Contacts contacts(std::span(&scene.colliders[index], 1), 0, 0, 0, 0);
+  const Contacts contacts(std::span(&scene.colliders[index], 1), {}, 0, 0, 0, 0);
   for (const SheetDefinition& sheet : scene.sheets) {
     const Matrix3Xd x = start_positions(sheet);
     int inside = 0, first = 0;

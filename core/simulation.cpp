@@ -79,8 +79,9 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
     deflate = dressing_at(*scene.dressing, time + dt).deflate;
     growth = dressing_at(*scene.dressing, time).deflate - deflate;
   }
+  bodies.place(time + dt, dt);
   for (std::size_t s = 0; s < sheets.size(); ++s)
-    sheets[s].solver->resolve(Contacts(scene.colliders, scene.sheets[s].textile.friction,
+    sheets[s].solver->resolve(Contacts(scene.colliders, bodies, scene.sheets[s].textile.friction,
                                        sheets[s].skin, time + dt, dt, deflate, growth),
                               pool);
 }
@@ -227,6 +228,7 @@ Simulation::State::State(Scene given, SolverFactory factory)
     : scene(std::move(given)),
       make_solver(std::move(factory)),
       sheets(scene.sheets.begin(), scene.sheets.end()),
+      bodies(scene.colliders),
       rest_after(end_of_motion(scene)),
       repairs(scene.solver) {
   std::vector<Matrix3Xd> x(sheets.size());
@@ -282,6 +284,7 @@ void Simulation::State::release_memory() {
   if (!failure.empty() || unfinished) return;
   for (MovingSheet& sheet : sheets) sheet.release_memory();
   cloth_contact.reset();
+  bodies.release_memory();
   released = true;
 }
 
@@ -411,14 +414,16 @@ void Simulation::copy_velocities(std::span<double> out) const {
 
 VectorXd Simulation::pressures(std::size_t sheet) const {
   state_->restore_memory();
+  state_->bodies.place(time(), 0);
   const MovingSheet& moving = state_->sheets[sheet];
-  return weft::pressures(state_->scene, state_->scene.sheets[sheet], moving, moving.good().x,
-                         time());
+  return weft::pressures(state_->scene, state_->bodies, state_->scene.sheets[sheet], moving,
+                         moving.good().x, time());
 }
 
 Verdict Simulation::verdict() const {
   state_->restore_memory();
-  return judge(state_->scene, state_->sheets, time(), at_rest());
+  state_->bodies.place(time(), 0);
+  return judge(state_->scene, state_->bodies, state_->sheets, time(), at_rest());
 }
 
 FrameStats Simulation::stats() const {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/cloth_contact/cloth_contact.h"
+#include "core/contact/moving_bodies.h"
 #include "core/model/actions.h"
 #include "core/motion/rest.h"
 #include "core/moving_sheet.h"
@@ -36,6 +37,7 @@ struct Simulation::State {
   Plan plan;
   std::vector<MovingSheet> sheets;
   std::optional<ClothContact> cloth_contact;
+  MovingBodies bodies;
   std::vector<Grip> grips;  // their pins are among the scene's
   std::int64_t frame = 0;
   std::int64_t substeps = 0;  // of the last frame

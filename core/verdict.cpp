@@ -20,10 +20,12 @@ constexpr double kMostSlid = 0.03;     // m
 constexpr double kMostDepth = 1e-4;    // of a particle in a collider, m
 
 // From the nearest collider.
-Distance distance_from_any(const Scene& scene, const Vector3d& x, double time) {
+Distance distance_from_any(const Scene& scene, const MovingBodies& bodies, const Vector3d& x,
+                           double time) {
   Distance least{kInfinite, Vector3d::UnitY()};
-  for (const Collider& collider : scene.colliders)
-    if (const Distance found = distance(collider, x, time); found.value < least.value)
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
+    if (const Distance found = distance(scene.colliders[c], x, time, bodies.of(c));
+        found.value < least.value)
       least = found;
   return least;
 }
@@ -60,11 +62,11 @@ void find_strains(const Scene& scene, const std::vector<Matrix3Xd>& x, Verdict& 
   verdict.strain_weft = percentile_99(std::move(weft));
 }
 
-void find_inside(const Scene& scene, const std::vector<Matrix3Xd>& x, double time,
-                 Verdict& verdict) {
+void find_inside(const Scene& scene, const MovingBodies& bodies, const std::vector<Matrix3Xd>& x,
+                 double time, Verdict& verdict) {
   for (const Matrix3Xd& sheet : x)
     for (const auto& position : sheet.colwise()) {
-      const double depth = -distance_from_any(scene, position, time).value;
+      const double depth = -distance_from_any(scene, bodies, position, time).value;
       if (depth <= kMostDepth) continue;
       ++verdict.particles_inside;
       verdict.deepest = std::max(verdict.deepest, depth);
@@ -109,8 +111,8 @@ void find_faults(const Scene& scene, Verdict& verdict) {
 
 }  // namespace
 
-VectorXd pressures(const Scene& scene, const SheetDefinition& sheet, const MovingSheet& moving,
-                   const Matrix3Xd& x, double time) {
+VectorXd pressures(const Scene& scene, const MovingBodies& bodies, const SheetDefinition& sheet,
+                   const MovingSheet& moving, const Matrix3Xd& x, double time) {
   constexpr double kTouching = 0.1;  // of the skin
   const VectorXd areas = areas_of(sheet.shape, x);
   Matrix3Xd force = moving.dynamics.gravity * moving.mesh.mass.transpose();
@@ -118,15 +120,15 @@ VectorXd pressures(const Scene& scene, const SheetDefinition& sheet, const Movin
   VectorXd pressure = VectorXd::Zero(x.cols());
   for (Eigen::Index i = 0; i < x.cols(); ++i) {
     if (moving.dynamics.inverse_mass[i] == 0 || areas[i] == 0) continue;
-    const auto [value, normal] = distance_from_any(scene, x.col(i), time);
+    const auto [value, normal] = distance_from_any(scene, bodies, x.col(i), time);
     if (value < (1 + kTouching) * moving.skin)
       pressure[i] = std::max(0.0, -force.col(i).dot(normal)) / areas[i];
   }
   return pressure;
 }
 
-Verdict judge(const Scene& scene, const std::vector<MovingSheet>& sheets, double time,
-              bool at_rest) {
+Verdict judge(const Scene& scene, const MovingBodies& bodies,
+              const std::vector<MovingSheet>& sheets, double time, bool at_rest) {
   Verdict verdict;
   verdict.dressed = !scene.dressing || time >= scene.dressing->end();
   verdict.at_rest = at_rest;
@@ -134,13 +136,13 @@ Verdict judge(const Scene& scene, const std::vector<MovingSheet>& sheets, double
   for (const MovingSheet& sheet : sheets) x.push_back(sheet.good().x);
   verdict.cloth_cuts = count_cuts(scene.sheets, x, 0).count;
   find_strains(scene, x, verdict);
-  find_inside(scene, x, time, verdict);
+  find_inside(scene, bodies, x, time, verdict);
   find_slid(scene, sheets, x, verdict);
   for (std::size_t s = 0; s < sheets.size(); ++s)
     if (!scene.colliders.empty() && x[s].cols() > 0)
       verdict.largest_pressure =
           std::max(verdict.largest_pressure,
-                   pressures(scene, scene.sheets[s], sheets[s], x[s], time).maxCoeff());
+                   pressures(scene, bodies, scene.sheets[s], sheets[s], x[s], time).maxCoeff());
   find_faults(scene, verdict);
   return verdict;
 }

@@ -8,6 +8,7 @@
 
 namespace weft {
 
+class MovingBodies;
 struct MovingSheet;
 
 // Something that keeps a drape from being good.
@@ -31,13 +32,13 @@ struct Verdict {
 };
 
 // What colliders press each particle with, Pa: all that forces and weight push it towards one that
-// it touches, over a third of the area of its triangles. So it is for cloth at rest. x: (3 x
-// particles) m, of a sheet in that scene.
-VectorXd pressures(const Scene& scene, const SheetDefinition& sheet, const MovingSheet& moving,
-                   const Matrix3Xd& x, double time);
+// it touches, over a third of the area of its triangles. So it is for cloth at rest. bodies: placed
+// for `time`; x: (3 x particles) m, of a sheet in that scene.
+VectorXd pressures(const Scene& scene, const MovingBodies& bodies, const SheetDefinition& sheet,
+                   const MovingSheet& moving, const Matrix3Xd& x, double time);
 
 // The sheets as they are at the end of a frame at `time`, in the order of the scene.
-Verdict judge(const Scene& scene, const std::vector<MovingSheet>& sheets, double time,
-              bool at_rest);
+Verdict judge(const Scene& scene, const MovingBodies& bodies,
+              const std::vector<MovingSheet>& sheets, double time, bool at_rest);
 
 }  // namespace weft

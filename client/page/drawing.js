@@ -64,18 +64,37 @@ function dots(size) {
 }
 
 // A body of triangles; each has its own corners, so that edges stay sharp where its neighbours turn away.
-function solidGeometry(data) {
-  const planes = new Float32Array(bytesOf(data.positions_m).buffer);
-  const triangles = new Uint32Array(bytesOf(data.triangles).buffer);
-  const count = planes.length / 3;
-  const corners = new Float32Array(3 * triangles.length);
-  triangles.forEach((vertex, i) => {
-    for (let axis = 0; axis < 3; ++axis) corners[3 * i + axis] = planes[axis * count + vertex];
-  });
-  const geometry = new THREE.BufferGeometry();
-  geometry.setAttribute('position', new THREE.BufferAttribute(corners, 3));
-  geometry.computeVertexNormals();
-  return geometry;
+class Solid {
+  constructor({positions_m, triangles, poses}) {
+    this.triangles = new Uint32Array(bytesOf(triangles).buffer);
+    this.times = poses?.times_s ?? [];
+    this.positions = new Float32Array(bytesOf(poses?.positions_m ?? positions_m).buffer);
+    this.count = this.positions.length / (3 * Math.max(1, this.times.length));
+    this.geometry = new THREE.BufferGeometry();
+    this.corners = new THREE.BufferAttribute(new Float32Array(3 * this.triangles.length), 3);
+    this.geometry.setAttribute('position', this.corners);
+    this.show(0);
+  }
+
+  // As it is at time t: between two poses, or in the first or the last.
+  show(t) {
+    const next = this.times.findIndex((time) => t < time);
+    const from = Math.max(0, (next < 0 ? this.times.length : next) - 1);
+    const to = next < 0 ? from : next;
+    const share = to > from ? (t - this.times[from]) / (this.times[to] - this.times[from]) : 0;
+    if (this.shown === from + share) return;
+    this.shown = from + share;
+    const {positions, count, corners: {array}} = this;
+    this.triangles.forEach((vertex, i) => {
+      for (let axis = 0; axis < 3; ++axis) {
+        const start = positions[(3 * from + axis) * count + vertex];
+        array[3 * i + axis] = start + share * (positions[(3 * to + axis) * count + vertex] - start);
+      }
+    });
+    this.corners.needsUpdate = true;
+    this.geometry.computeVertexNormals();
+    this.geometry.computeBoundingSphere();
+  }
 }
 
 // The shape of a collider as a mesh where it starts; a plane is shown as far as `reach`.
@@ -109,7 +128,8 @@ function colliderMesh(collider, material, centre, reach) {
       side.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis.normalize());
     }
   } else if (collider.mesh?.data) {
-    add(group, solidGeometry(collider.mesh.data), new THREE.Vector3());
+    group.solid = new Solid(collider.mesh.data);
+    add(group, group.solid.geometry, new THREE.Vector3());
   } else if (collider.plane) {
     const {normal, point} = surfaceOf(collider.plane, centre);
     const disc = add(group, new THREE.CircleBufferGeometry(reach, 96), point);
@@ -291,7 +311,10 @@ class Pane {
     this.source.cloth.writeNormals(this.normal.array, this.position.array);
     kQuantities[quantity]?.write(this.source, this.values, this.position.array, place.frame);
     this.position.needsUpdate = this.normal.needsUpdate = true;
-    for (const {mesh, path} of this.bodies) mesh.position.copy(pathOffset(path, t));
+    for (const {mesh, path} of this.bodies) {
+      mesh.position.copy(pathOffset(path, t));
+      mesh.solid?.show(t);
+    }
   }
 
   // The colours of panels, by their names.

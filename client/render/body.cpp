@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <string_view>
 
 #include "client/exports/normals.h"
 
@@ -24,17 +25,42 @@ Vector3d offset_at(const google::protobuf::RepeatedPtrField<v1::Keyframe>& path,
   return from + share * (vector_of(next->offset_m()) - from);
 }
 
+std::vector<float> floats_of(std::string_view bytes) {
+  std::vector<float> values(bytes.size() / sizeof(float));
+  if (!values.empty()) std::memcpy(values.data(), bytes.data(), values.size() * sizeof(float));
+  return values;
+}
+
+// Planes x, y, z of the vertices at that time.
+std::vector<float> positions_at(const v1::MeshData& mesh, double time_s) {
+  const auto& times = mesh.poses().times_s();
+  if (times.empty()) return floats_of(mesh.positions_m());
+  const std::string_view all = mesh.poses().positions_m();
+  const std::size_t size = all.size() / static_cast<std::size_t>(times.size());
+  const auto pose = [&](std::ptrdiff_t p) {
+    return floats_of(all.substr(static_cast<std::size_t>(p) * size, size));
+  };
+  const std::ptrdiff_t next = std::upper_bound(times.begin(), times.end(), time_s) - times.begin();
+  std::vector<float> from = pose(std::max(next - 1, std::ptrdiff_t{0}));
+  if (next == 0 || next == times.size()) return from;
+  const double before = times[static_cast<int>(next - 1)];
+  const auto share =
+      static_cast<float>((time_s - before) / (times[static_cast<int>(next)] - before));
+  const std::vector<float> to = pose(next);
+  for (std::size_t i = 0; i < from.size(); ++i) from[i] += share * (to[i] - from[i]);
+  return from;
+}
+
 Vector3d direction_of(const Vector3d& vector, const Vector3d& otherwise) {
   const double length = vector.norm();
   return length > 0 ? Vector3d(vector / length) : otherwise;
 }
 
-Solid solid_of(const v1::MeshData& mesh, const Vector3d& offset) {
+Solid solid_of(const v1::MeshData& mesh, const Vector3d& offset, double time_s) {
   Solid solid;
   solid.offset = offset;
-  const std::size_t count = mesh.positions_m().size() / (3 * sizeof(float));
-  std::vector<float> planes(3 * count);
-  std::memcpy(planes.data(), mesh.positions_m().data(), planes.size() * sizeof(float));
+  const std::vector<float> planes = positions_at(mesh, time_s);
+  const std::size_t count = planes.size() / 3;
   const auto plane = [&](std::size_t axis) {
     const auto first = planes.begin() + static_cast<std::ptrdiff_t>(axis * count);
     return std::vector<double>(first, first + static_cast<std::ptrdiff_t>(count));
@@ -51,7 +77,7 @@ Solid solid_of(const v1::MeshData& mesh, const Vector3d& offset) {
   return solid;
 }
 
-Body body_of(const v1::Collider& collider, const Vector3d& offset) {
+Body body_of(const v1::Collider& collider, const Vector3d& offset, double time_s) {
   switch (collider.shape_case()) {
     case v1::Collider::kSphere:
       return Ball{vector_of(collider.sphere().center_m()) + offset, collider.sphere().radius_m()};
@@ -70,7 +96,7 @@ Body body_of(const v1::Collider& collider, const Vector3d& offset) {
       return Cuboid{vector_of(box.center_m()) + offset, vector_of(box.half_size_m()), rotation};
     }
     case v1::Collider::kMesh:
-      return solid_of(collider.mesh().data(), offset);
+      return solid_of(collider.mesh().data(), offset, time_s);
     default: {
       const v1::Plane& plane = collider.plane();
       return HalfSpace{vector_of(plane.point_m()) + offset,
@@ -130,7 +156,7 @@ Vector3d vector_of(const v1::Vector3& value) { return {value.x(), value.y(), val
 std::vector<Body> bodies_at(const v1::Scene& scene, double time_s) {
   std::vector<Body> bodies;
   for (const auto& collider : scene.colliders())
-    bodies.push_back(body_of(collider, offset_at(collider.path(), time_s)));
+    bodies.push_back(body_of(collider, offset_at(collider.path(), time_s), time_s));
   return bodies;
 }
 

@@ -40,8 +40,10 @@ Eigen::AlignedBox3d box_of(const BodyMesh& mesh) {
 // Blocks near the surface cost memory, those around it a little, and a reach of many cells.
 double cell_of(const BodyMesh& mesh, const BodySettings& settings) {
   constexpr double kMostReach = 6;  // cells
+  constexpr double kMoving = 1.5;
   const double surface = surface_of(mesh);
-  const double wanted = settings.cell > 0 ? settings.cell : std::sqrt(surface / kChosenSquares);
+  const double chosen = std::sqrt(surface / kChosenSquares) * (settings.moves ? kMoving : 1);
+  const double wanted = settings.cell > 0 ? settings.cell : chosen;
   return std::max({wanted, std::sqrt(surface / kMostSquares), settings.reach / kMostReach,
                    std::cbrt(box_of(mesh).volume() / kMostBlocks) / kCells});
 }

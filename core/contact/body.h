@@ -14,6 +14,8 @@ namespace weft {
 struct BodySettings {
   double cell = 0;   // edge of a cell; 0: chosen
   double reach = 0;  // how far outside contact needs exact values
+  // Through poses, where grids are made again and again: chosen cells are half as large again.
+  bool moves = false;
 };
 
 // A body, or what keeps the mesh from being one; paths begin with `field`.

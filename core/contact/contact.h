@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "core/contact/moving_bodies.h"
 #include "core/model/scene.h"
 
 namespace weft {
@@ -21,26 +22,29 @@ Distance distance(const Capsule& capsule, const Vector3d& point);
 // Of a body of triangles as its grid has it; farther outside than its reach it is nearer than the
 // body, and the direction of no meaning.
 Distance distance(const SharedBody& body, const Vector3d& point);
-Distance distance(const Collider& collider, const Vector3d& point, double time);
+// posed: the body as it was placed for that time, where it has left its first pose.
+Distance distance(const Collider& collider, const Vector3d& point, double time,
+                  const PosedBody* posed = nullptr);
 
 // The colliders of a scene during one step, as a sheet meets them.
 class Contacts {
  public:
   // friction: of the textile; skin: m; from `time` - dt to `time`, s. Colliders are smaller all
-  // around by `deflate` (m), and grow by `growth` (m) in the step.
-  Contacts(std::span<const Collider> colliders, double friction, double skin, double time,
-           double dt, double deflate = 0, double growth = 0);
+  // around by `deflate` (m), and grow by `growth` (m) in the step. bodies: placed for the step.
+  Contacts(std::span<const Collider> colliders, const MovingBodies& bodies, double friction,
+           double skin, double time, double dt, double deflate = 0, double growth = 0);
 
   // A collider where it is at the end of the step.
   struct Placed {
     const Collider& collider;
-    Eigen::Matrix3d turn;  // of a box
-    Vector3d offset;       // from its start, m
-    Vector3d carried;      // its displacement in the step, m
-    double friction;       // between it and the textile
-    double thickness;      // of it where it is thinnest, with the skin on both sides, m
-    double steepest;       // by how much its distances grow in a metre, at most
-    double creep;          // how far what began in it is pushed out in the step, m
+    Eigen::Matrix3d turn;              // of a box
+    Vector3d offset;                   // from its start, m
+    Vector3d carried;                  // its displacement in the step, m
+    double friction;                   // between it and the textile
+    double thickness;                  // of it where it is thinnest, with the skin on both sides, m
+    double steepest;                   // by how much its distances grow in a metre, at most
+    double creep;                      // how far what began in it is pushed out in the step, m
+    const PosedBody* posed = nullptr;  // between poses; offset and carried are of its middle then
   };
   std::span<const Placed> placed() const { return placed_; }
   // Of the textile, from colliders as they are given: less than nothing where they are deflated.

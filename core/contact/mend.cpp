@@ -54,7 +54,7 @@ class Mender {
       problem("triangles", "has ", triangles.size(), " triangles; 4 to ", kMostTriangles,
               " are needed");
     for (std::size_t i = 0; i < vertices.size(); ++i)
-      if (!(vertices[i].cwiseAbs().maxCoeff() <= kFarthest))
+      if (!(vertices[i].array().abs() <= kFarthest).all())  // nor where one is no number
         problem("positions_m", "vertex ", i, " does not lie within ", kFarthest,
                 " m of the origin along each axis");
     for (std::size_t t = 0; t < triangles.size(); ++t)

@@ -27,6 +27,7 @@ HWY_INLINE Places everywhere(const Vector3d& v) { return {real(v[0]), real(v[1])
 struct Distances {
   Reals value;
   Places normal;
+  Reals change = real(0);  // of the value from one grid to the next
 };
 
 HWY_INLINE Distances distances_from_ball(const Places& center, double radius, const Places& point) {
@@ -91,16 +92,16 @@ HWY_INLINE Distances distances(const Box& box, const Eigen::Matrix3d& turn, cons
   return {hn::IfThenElse(apart, length, inside), normal};
 }
 
-// The distance of the plain version, which says more of it.
-HWY_INLINE Distances distances(const SharedBody& body, const Eigen::Matrix3d&,
-                               const Places& point) {
+// Where points are in a grid: as in the plain version, which says more of it.
+struct InGrids {
+  Reals first, row, layer;
+  Places share;
+  Reals beyond;
+};
+
+HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point) {
   const ContactTag tag;
   const hn::Rebind<std::int32_t, ContactTag> ints;
-  const hn::Rebind<float, ContactTag> floats;
-  const hn::Rebind<std::uint32_t, ContactTag> words;
-  const hn::RebindToSigned<ContactTag> offsets;
-  const hn::RebindToUnsigned<ContactTag> pairs;
-  const DistanceGrid& grid = body->grid;
   constexpr double kBlock = DistanceGrid::kBlock;
   const double edge = kBlock * grid.cell;
   const Reals zero = real(0), one = real(1);
@@ -122,12 +123,27 @@ HWY_INLINE Distances distances(const SharedBody& body, const Eigen::Matrix3d&,
   const Reals cells = hn::IfThenElse(fine, real(kBlock), one);
   const Places in_block = times(minus(inside, block), cells);
   const Places cell{whole(in_block.x, cells), whole(in_block.y, cells), whole(in_block.z, cells)};
-  const Places share = minus(in_block, cell);
 
-  // values at the corners of the cell, and between them
   const Reals row = hn::Add(cells, one), layer = hn::Mul(row, row);
   const Reals first = hn::Add(hn::IfThenElse(fine, begin, hn::Sub(hn::Neg(one), begin)),
                               hn::MulAdd(cell.z, layer, hn::MulAdd(cell.y, row, cell.x)));
+  const Places away = minus(at, inside);
+  return {first, row, layer, minus(in_block, cell), hn::Mul(hn::Sqrt(squared(away)), real(edge))};
+}
+
+struct BetweenCorners {
+  Reals value;
+  Places slope;
+};
+
+// Between the values at the corners of cells.
+HWY_INLINE BetweenCorners between_corners(const float* values, const InGrids& at) {
+  const ContactTag tag;
+  const hn::Rebind<std::int32_t, ContactTag> ints;
+  const hn::Rebind<float, ContactTag> floats;
+  const hn::Rebind<std::uint32_t, ContactTag> words;
+  const hn::RebindToSigned<ContactTag> offsets;
+  const hn::RebindToUnsigned<ContactTag> pairs;
   const auto between = [](Reals a, Reals b, Reals s)
                            HWY_ATTR { return hn::MulAdd(hn::Sub(b, a), s, a); };
   struct Line {
@@ -137,35 +153,51 @@ HWY_INLINE Distances distances(const SharedBody& body, const Eigen::Matrix3d&,
     // two neighbours at a time
     const auto bytes = hn::ShiftLeft<2>(hn::PromoteTo(offsets, hn::DemoteTo(ints, from)));
     const auto pair =
-        hn::GatherOffset(pairs, reinterpret_cast<const std::uint64_t*>(grid.values.data()), bytes);
+        hn::GatherOffset(pairs, reinterpret_cast<const std::uint64_t*>(values), bytes);
     const auto read = [&](auto v) HWY_ATTR {
       return hn::PromoteTo(tag, hn::BitCast(floats, hn::TruncateTo(words, v)));
     };
     const Reals a = read(pair), b = read(hn::ShiftRight<32>(pair));
     const Reals slope = hn::Sub(b, a);
-    return Line{hn::MulAdd(slope, share.x, a), slope};
+    return Line{hn::MulAdd(slope, at.share.x, a), slope};
   };
   struct Face {
     Reals value, x, y;
   };
   const auto across_y = [&](Reals from) HWY_ATTR {
-    const Line low = along_x(from), high = along_x(hn::Add(from, row));
+    const Line low = along_x(from), high = along_x(hn::Add(from, at.row));
     const Reals slope = hn::Sub(high.value, low.value);
-    return Face{hn::MulAdd(slope, share.y, low.value), between(low.slope, high.slope, share.y),
-                slope};
+    return Face{hn::MulAdd(slope, at.share.y, low.value),
+                between(low.slope, high.slope, at.share.y), slope};
   };
-  const Face low = across_y(first), high = across_y(hn::Add(first, layer));
-  const Places gradient{between(low.x, high.x, share.z), between(low.y, high.y, share.z),
-                        hn::Sub(high.value, low.value)};
-  const Reals length = hn::Sqrt(squared(gradient));
+  const Face low = across_y(at.first), high = across_y(hn::Add(at.first, at.layer));
+  return {between(low.value, high.value, at.share.z),
+          {between(low.x, high.x, at.share.z), between(low.y, high.y, at.share.z),
+           hn::Sub(high.value, low.value)}};
+}
+
+HWY_INLINE Places direction(const Places& v) {
+  const Reals zero = real(0), one = real(1);
+  const Reals length = hn::Sqrt(squared(v));
   const auto sloped = hn::Gt(length, zero);
-  const Places normal = times(gradient, hn::Div(one, length));
-  const Places away = minus(at, inside);
-  const Reals beyond = hn::Mul(hn::Sqrt(squared(away)), real(edge));
-  return {hn::IfThenElse(hn::Gt(beyond, zero), hn::Add(real(grid.reach), beyond),
-                         between(low.value, high.value, share.z)),
-          {hn::IfThenElseZero(sloped, normal.x), hn::IfThenElse(sloped, normal.y, one),
-           hn::IfThenElseZero(sloped, normal.z)}};
+  const Places normal = times(v, hn::Div(one, length));
+  return {hn::IfThenElseZero(sloped, normal.x), hn::IfThenElse(sloped, normal.y, one),
+          hn::IfThenElseZero(sloped, normal.z)};
+}
+
+HWY_INLINE Distances distances(const DistanceGrid& grid, const Places& point) {
+  const InGrids at = locate(grid, point);
+  const auto [value, slope] = between_corners(grid.values.data(), at);
+  return {hn::IfThenElse(hn::Gt(at.beyond, real(0)), hn::Add(real(grid.reach), at.beyond), value),
+          direction(slope)};
+}
+
+HWY_INLINE Distances distances(const PosedBody& body, const Places& point) {
+  const Distances from = distances(body.from->distances, point),
+                  to = distances(body.to->distances, point);
+  const Reals share = real(body.share), change = hn::Sub(to.value, from.value);
+  return {hn::MulAdd(change, share, from.value),
+          direction(plus_times(from.normal, minus(to.normal, from.normal), share)), change};
 }
 
 HWY_INLINE Distances distances(const Contacts::Placed& placed, const Places& point) {
@@ -174,8 +206,24 @@ HWY_INLINE Distances distances(const Contacts::Placed& placed, const Places& poi
   if (const auto* plane = std::get_if<Plane>(&shape)) return distances(*plane, placed.turn, at);
   if (const auto* sphere = std::get_if<Sphere>(&shape)) return distances(*sphere, placed.turn, at);
   if (const auto* box = std::get_if<Box>(&shape)) return distances(*box, placed.turn, at);
-  if (const auto* body = std::get_if<SharedBody>(&shape)) return distances(*body, placed.turn, at);
+  if (placed.posed != nullptr) return distances(*placed.posed, at);
+  if (const auto* body = std::get_if<SharedBody>(&shape)) return distances((*body)->grid, at);
   return distances(*std::get_if<Capsule>(&shape), placed.turn, at);
+}
+
+// Displacement of the surface near points in the step. What leads out is as the distance changes.
+HWY_INLINE Places carried_at(const Contacts::Placed& placed, const Places& x, const Places& normal,
+                             Reals change) {
+  const Places carried = everywhere(placed.carried);
+  const PosedBody* posed = placed.posed;
+  if (posed == nullptr) return carried;
+  const PoseGrid& grid = *posed->from;
+  const InGrids at = locate(grid.distances, minus(x, everywhere(placed.offset)));
+  const Places way{between_corners(grid.ways[0].data(), at).value,
+                   between_corners(grid.ways[1].data(), at).value,
+                   between_corners(grid.ways[2].data(), at).value};
+  const Places led = minus_times(way, normal, hn::Add(dot(way, normal), change));
+  return plus_times(carried, led, real(posed->step));
 }
 
 // See Contacts::gap(); and the distances from the first collider. Precondition: there is one.
@@ -206,9 +254,9 @@ HWY_INLINE void resolve_places(const Contacts& contacts, M active, const Distanc
     Reals deepest = zero;
     for (const Contacts::Placed& placed : contacts.placed()) {
       const bool known = round == 0 && &placed == contacts.placed().data();
-      const auto [value, normal] = known ? first : distances(placed, x);
+      const auto [value, normal, change] = known ? first : distances(placed, x);
       const auto touching = hn::And(active, hn::Lt(value, skin));
-      const Places relative = minus(d, everywhere(placed.carried));
+      const Places relative = minus(d, carried_at(placed, x, normal, change));
       const Reals approach = dot(relative, normal);
       const Reals come = hn::Max(hn::Neg(approach), zero);
       const Reals most = hn::Add(hn::Add(come, pushed), real(placed.creep));

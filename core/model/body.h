@@ -17,6 +17,26 @@ struct BodyMesh {
   std::vector<std::array<int, 3>> triangles;
 };
 
+// Positions of all vertices at given times, linear between, constant outside: large, and never
+// changed.
+struct Poses {
+  std::vector<double> times;     // s, rising
+  std::vector<float> positions;  // m: of each pose x of all vertices, then y, then z
+  // These follow, see complete().
+  std::vector<Vector3d> middles;  // mean of the vertices of each pose, m
+  // From each pose to the next: the longest way of a vertex, m, and past that of the middle.
+  std::vector<double> ways, own_ways;
+
+  std::size_t vertices() const { return positions.size() / (3 * times.size()); }
+  Vector3d position(std::size_t pose, std::size_t vertex) const;
+};
+
+// The poses with what follows from them. Precondition: find_problems() finds none.
+std::shared_ptr<const Poses> complete(Poses poses);
+
+// Of the fastest vertex between two times, m/s.
+double fastest(const Poses& poses, double begin, double end);
+
 // Signed distances from a surface at the corners of cells, negative inside; between corners they
 // are trilinear. Cells lie in blocks, and each block has all of its corners, x before y before z:
 // near the surface those of its cells, deep inside the eight of the block; where the block is

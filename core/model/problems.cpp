@@ -275,6 +275,20 @@ void check_reach(const Scene& scene, const Collider& collider, const std::string
                                          text(skin) + " m");
 }
 
+// Between poses distances are known near the surface only, not deep below it.
+void check_poses(const Scene& scene, const Collider& collider, const std::string& field,
+                 Check& check) {
+  if (!collider.poses || !scene.dressing || scene.dressing->deflate == 0) return;
+  const double full = scene.dressing->close + scene.dressing->settle;
+  const double first = collider.poses->times.front();
+  if (collider.poses->times.size() > 1 && first < full)
+    check.problem(field + (collider.asset.empty() ? ".mesh.data.poses.times_s[0]" : ".mesh.asset"),
+                  "leaves its first pose at " + text(first) +
+                      " s; it has dressing.deflate_m to grow back by until " + text(full) +
+                      " s (close_s + settle_s), and is not to move "
+                      "before");
+}
+
 // sound: of each sheet, whether it has no problem of its own.
 void check_dressing(const Scene& scene, const std::vector<bool>& sound, Check& check) {
   constexpr std::size_t kMostHolds = 64;
@@ -351,6 +365,7 @@ std::vector<Problem> find_problems(const Scene& scene) {
     check.name(field + ".name", collider.name, collider_names);
     std::visit([&](const auto& shape) { check_shape(shape, field, check); }, collider.shape);
     check_reach(scene, collider, field, check);
+    check_poses(scene, collider, field, check);
     check.number(field + ".friction_coefficient", collider.friction, 0, 10, "");
     check.path(field + ".path", collider.path);
     check.speed(field + ".path", collider.path);

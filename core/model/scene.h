@@ -113,6 +113,7 @@ struct Collider {
   std::variant<Plane, Sphere, Box, Capsule, SharedBody> shape;
   double friction = 0.3;
   Path path;
+  std::shared_ptr<const Poses> poses{};  // of its body; none: it keeps its shape
   std::string asset = {};        // name of what holds the mesh of its body; empty: it has none
   std::optional<double> cell{};  // of its body's grid as asked for, m
 };
@@ -184,7 +185,9 @@ struct Problem {
 // Everything that keeps a scene from being simulated; empty for a good one.
 std::vector<Problem> find_problems(const Scene& scene);
 
-// The same for a textile alone; `field` is its path.
+// The same for poses of a mesh with so many vertices, and for a textile alone; `field` is the path.
+std::vector<Problem> find_problems(const Poses& poses, std::size_t vertices,
+                                   const std::string& field);
 std::vector<Problem> find_problems(const Textile& textile, const std::string& field);
 
 }  // namespace weft

@@ -336,10 +336,13 @@ void Reader::set_body(const v1::BodyMesh& from, const std::string& field, Collid
   // in steps, for scenes to share bodies
   const double reach = std::exp2(std::ceil(std::log2(std::max(largest_skin_, 1e-3))));
   auto made = to_body(*data, collider.cell, reach, path);
-  if (auto* problems = std::get_if<std::vector<Problem>>(&made))
+  if (auto* problems = std::get_if<std::vector<Problem>>(&made)) {
     std::move(problems->begin(), problems->end(), std::back_inserter(problems_));
-  else
-    collider.shape = std::get<SharedBody>(std::move(made));
+  } else {
+    auto& [body, poses] = std::get<ConvertedBody>(made);
+    collider.shape = std::move(body);
+    collider.poses = std::move(poses);
+  }
   if (from.has_asset()) collider.asset = from.asset();
 }
 

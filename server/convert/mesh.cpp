@@ -10,10 +10,13 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/contact/body.h"
 #include "core/contact/mend.h"
+#include "core/contact/moving_bodies.h"
 #include "core/model/mesh_problems.h"
 #include "core/model/text.h"
 
@@ -25,7 +28,7 @@ static_assert(std::endian::native == std::endian::little);
 using Triangle = std::array<std::uint32_t, 3>;
 
 template <class Value>
-std::vector<Value> values_of(const std::string& bytes) {
+std::vector<Value> values_of(std::string_view bytes) {
   std::vector<Value> values(bytes.size() / sizeof(Value));
   if (!values.empty()) std::memcpy(values.data(), bytes.data(), values.size() * sizeof(Value));
   return values;
@@ -39,9 +42,17 @@ std::string bytes_of(const std::vector<Value>& values) {
 // Corners of the flat shape, or 0 where it has none of its own.
 std::size_t corners_of(const v1::MeshData& mesh) { return mesh.flat_m().size() / 8; }
 
+// Of a mesh with poses, its first one.
+std::string_view positions_of(const v1::MeshData& mesh) {
+  const std::string_view poses = mesh.poses().positions_m();
+  const auto count = static_cast<std::size_t>(mesh.poses().times_s_size());
+  if (count == 0) return mesh.positions_m();
+  return poses.substr(0, poses.size() / count);
+}
+
 // Points in planes of float32.
 template <class Point>
-std::vector<Point> points_of(const std::string& bytes) {
+std::vector<Point> points_of(std::string_view bytes) {
   const auto values = values_of<float>(bytes);
   const std::size_t axes = Point::RowsAtCompileTime, count = values.size() / axes;
   std::vector<Point> points(count);
@@ -74,24 +85,59 @@ void check_size(const std::string& bytes, std::size_t unit, const std::string& f
 // Sessions with the same body share it, as long as one of them is there.
 MadeBody shared_body(const v1::MeshData& from, const BodySettings& settings,
                      const std::string& field) {
+  const std::string_view positions = positions_of(from);
   static std::mutex mutex;
   static std::map<std::string, std::weak_ptr<const Body>> bodies;
-  const std::string key = from.positions_m() + from.triangles() +
-                          bytes_of(std::vector{static_cast<double>(from.positions_m().size()),
-                                               settings.cell, settings.reach});
+  const std::string key = std::string(positions) + from.triangles() +
+                          bytes_of(std::vector{static_cast<double>(positions.size()), settings.cell,
+                                               settings.reach, settings.moves ? 1.0 : 0.0});
   {
     const std::lock_guard lock(mutex);
     const auto known = bodies.find(key);
     if (known != bodies.end())
       if (auto body = known->second.lock()) return {std::move(body), {}};
   }
-  MadeBody made = make_body(
-      {points_of<Vector3d>(from.positions_m()), triangles_of(from.triangles())}, settings, field);
+  MadeBody made =
+      make_body({points_of<Vector3d>(positions), triangles_of(from.triangles())}, settings, field);
   if (!made.body) return made;
   const std::lock_guard lock(mutex);
   std::erase_if(bodies, [](const auto& each) { return each.second.expired(); });
   bodies[key] = made.body;
   return made;
+}
+
+// What of a mesh keeps it from being a body's, before its triangles are looked at.
+std::vector<Problem> find_body_problems(const v1::MeshData& mesh, const std::string& field) {
+  std::vector<Problem> problems;
+  check_size(mesh.positions_m(), 12, field + ".positions_m", problems);
+  check_size(mesh.triangles(), sizeof(Triangle), field + ".triangles", problems);
+  check_size(mesh.poses().positions_m(), 12, field + ".poses.positions_m", problems);
+  const auto refuse = [&](bool given, const char* name) {
+    if (given) problems.push_back({join(field, ".", name), "is for sheets; a body has none"});
+  };
+  refuse(!mesh.flat_m().empty(), "flat_m");
+  refuse(!mesh.flat_triangles().empty(), "flat_triangles");
+  refuse(mesh.panels_size() > 0, "panels");
+  return problems;
+}
+
+// As they are given.
+Poses read_poses(const v1::Poses& from) {
+  return {{from.times_s().begin(), from.times_s().end()},
+          values_of<float>(from.positions_m()),
+          {},
+          {},
+          {}};
+}
+
+std::vector<Problem> find_pose_problems(const Poses& poses, const v1::MeshData& mesh,
+                                        const std::string& field) {
+  const std::size_t own = mesh.positions_m().size() / 12, posed = positions_of(mesh).size() / 12;
+  auto problems = find_problems(poses, own > 0 ? own : posed, field + ".poses");
+  if (own > 0 && own != posed)
+    problems.push_back(
+        {field + ".positions_m", join("has ", own, " vertices; its poses have ", posed)});
+  return problems;
 }
 
 struct Edges {
@@ -133,7 +179,7 @@ std::array<std::array<double, 3>, 3> corners(const v1::MeshData& mesh, const Tri
                                              const Triangle& flat) {
   std::array<std::array<double, 3>, 3> points{};
   const bool has_flat = !mesh.flat_m().empty();
-  const std::string& bytes = has_flat ? mesh.flat_m() : mesh.positions_m();
+  const std::string_view bytes = has_flat ? mesh.flat_m() : positions_of(mesh);
   const std::size_t axes = has_flat ? 2 : 3, count = bytes.size() / (4 * axes);
   for (std::size_t corner = 0; corner < 3; ++corner) {
     const std::size_t index = has_flat ? flat[corner] : in_space[corner];
@@ -154,6 +200,8 @@ Converted<Triangles> to_mesh(const v1::MeshData& from, const std::string& field)
   check_size(from.triangles(), sizeof(Triangle), field + ".triangles", problems);
   check_size(from.flat_m(), 8, field + ".flat_m", problems);
   check_size(from.flat_triangles(), sizeof(Triangle), field + ".flat_triangles", problems);
+  if (from.has_poses())
+    problems.push_back({field + ".poses", "is for bodies that move; a sheet has none"});
   if (from.positions_m().empty() && (from.flat_m().empty() || !from.flat_triangles().empty()))
     problems.push_back({field + ".positions_m",
                         "is absent; give positions, or a flat shape of which every corner is a "
@@ -173,24 +221,33 @@ Converted<Triangles> to_mesh(const v1::MeshData& from, const std::string& field)
   return problems;
 }
 
-Converted<SharedBody> to_body(const v1::MeshData& from, std::optional<double> cell, double reach,
-                              const std::string& field) {
-  std::vector<Problem> problems;
-  check_size(from.positions_m(), 12, field + ".positions_m", problems);
-  check_size(from.triangles(), sizeof(Triangle), field + ".triangles", problems);
-  const auto refuse = [&](bool given, const char* name) {
-    if (given) problems.push_back({join(field, ".", name), "is for sheets; a body has none"});
-  };
-  refuse(!from.flat_m().empty(), "flat_m");
-  refuse(!from.flat_triangles().empty(), "flat_triangles");
-  refuse(from.panels_size() > 0, "panels");
+Converted<ConvertedBody> to_body(const v1::MeshData& from, std::optional<double> cell, double reach,
+                                 const std::string& field) {
+  std::vector<Problem> problems = find_body_problems(from, field);
+  ConvertedBody result;
+  if (from.has_poses() && problems.empty()) {
+    Poses poses = read_poses(from.poses());
+    problems = find_pose_problems(poses, from, field);
+    if (problems.empty()) result.poses = complete(std::move(poses));
+  }
   if (!problems.empty()) return problems;
-  MadeBody made = shared_body(from, {cell.value_or(0), reach}, field);
-  if (made.body) return std::move(made.body);
-  return std::move(made.problems);
+  BodySettings settings{cell.value_or(0), reach, result.poses != nullptr};
+  MadeBody made = shared_body(from, settings, field);
+  if (!made.body) return std::move(made.problems);
+  if (result.poses) settings.cell = least_pose_cell(*result.poses, made.body->mesh.triangles);
+  if (settings.cell > made.body->grid.cell) made = shared_body(from, settings, field);
+  result.body = std::move(made.body);
+  return result;
 }
 
 std::vector<Problem> find_problems(const v1::MeshData& mesh, const std::string& field) {
+  if (mesh.has_poses()) {
+    auto problems = find_body_problems(mesh, field);
+    if (problems.empty()) problems = find_pose_problems(read_poses(mesh.poses()), mesh, field);
+    if (!problems.empty()) return problems;
+    return mend({points_of<Vector3d>(positions_of(mesh)), triangles_of(mesh.triangles())}, field)
+        .problems;
+  }
   auto sheet = to_mesh(mesh, field);
   if (std::holds_alternative<Triangles>(sheet)) return {};
   if (!mesh.positions_m().empty()) {
@@ -233,8 +290,8 @@ v1::MeshData to_proto(const Triangles& mesh) {
 }
 
 std::int64_t particles_of(const v1::MeshData& mesh) {
-  return static_cast<std::int64_t>(mesh.positions_m().empty() ? corners_of(mesh)
-                                                              : mesh.positions_m().size() / 12);
+  const std::size_t positions = positions_of(mesh).size() / 12;
+  return static_cast<std::int64_t>(positions > 0 ? positions : corners_of(mesh));
 }
 
 v1::MeshFacts facts_of(const v1::MeshData& mesh) {
@@ -265,6 +322,7 @@ v1::MeshFacts facts_of(const v1::MeshData& mesh) {
   facts.set_branching_edges(edges.branching);
   facts.set_closed(edges.border == 0 && edges.branching == 0 && edges.oriented);
   facts.set_least_height_m(least);
+  facts.set_poses(mesh.poses().times_s_size());
   return facts;
 }
 

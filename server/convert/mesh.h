@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,10 +15,15 @@ namespace weft {
 // A mesh that can be simulated, or everything that is wrong with it. Paths begin with `field`.
 Converted<Triangles> to_mesh(const v1::MeshData& from, const std::string& field);
 
-// A body for sheets with skins up to `reach`, m, with cells of that edge, m, or all that is wrong
-// with its mesh.
-Converted<SharedBody> to_body(const v1::MeshData& from, std::optional<double> cell, double reach,
-                              const std::string& field);
+// A body, and the poses that it moves through; nullptr: none.
+struct ConvertedBody {
+  SharedBody body;
+  std::shared_ptr<const Poses> poses;
+};
+// For sheets with skins up to `reach`, m, with cells of that edge, m, or all that is wrong with its
+// mesh.
+Converted<ConvertedBody> to_body(const v1::MeshData& from, std::optional<double> cell, double reach,
+                                 const std::string& field);
 // What is wrong with a mesh that is neither a sheet nor a body.
 std::vector<Problem> find_problems(const v1::MeshData& mesh, const std::string& field);
 

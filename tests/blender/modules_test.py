@@ -148,7 +148,7 @@ class Scenes(unittest.TestCase):
         self.assertEqual([round(each.time_s, 9) for each in keyframes(offsets, 0.1)],
                          [0, 0.4, 0.5, 0.9])
 
-    def test_a_body_that_moves_has_a_path_and_one_that_turns_is_refused(self):
+    def test_a_body_that_moves_has_a_path_and_one_that_turns_has_poses(self):
         body = cube()
         ways = np.linspace(0, 1, 6)[:, None] * [0, 0, 0.5]
         moves = body.points + ways[:, None]
@@ -156,8 +156,16 @@ class Scenes(unittest.TestCase):
         (collider,) = prepare(WORLD, [cloth], [Body("box", body, moves)]).scene.colliders
         np.testing.assert_allclose([each.offset_m for each in collider.path], ways, atol=1e-6)
         moves[4] = body.points @ turned(0.1, (0, 0, 1)).T
-        with self.assertRaisesRegex(Refused, r"box: turns, grows .* from frame 5 on; .* no poses"):
-            prepare(WORLD, [cloth], [Body("box", body, moves)])
+        (collider,) = prepare(WORLD, [cloth], [Body("box", body, moves)]).scene.colliders
+        poses = collider.shape.source.poses
+        self.assertEqual(collider.path, [])
+        np.testing.assert_allclose(poses.times_s, np.arange(6) * 0.04, atol=1e-9)
+        np.testing.assert_allclose(poses.positions_m, moves)
+
+    def test_a_floor_that_turns_is_refused(self):
+        moves = np.array([level().points @ turned(angle, (1, 0, 0)).T for angle in (0, 0.1)])
+        with self.assertRaisesRegex(Refused, "floor: is flat, .* cannot turn"):
+            prepare(WORLD, [Cloth("a", level(), "denim_11oz")], [Body("floor", level(), moves)])
 
     def test_a_flat_body_is_a_floor(self):
         floor = level()

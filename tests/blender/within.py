@@ -238,13 +238,6 @@ class Refusals(unittest.TestCase):
         self.assertIn("its vertices are selected", said)
         self.assertEqual(self.selected(body), hole)
 
-    def test_a_body_that_turns_or_changes_its_shape_is_refused(self):
-        body = ball()
-        for frame, turn in (1, 0), (10, 0), (20, 1):
-            body.rotation_euler[0] = turn
-            body.keyframe_insert("rotation_euler", frame=frame)
-        self.assertRegex(refusal(), "Ball: turns, .* from frame 11 on; the server .* has no poses")
-
     def test_a_mesh_that_changes_its_vertices_is_refused(self):
         built = self.cloth.modifiers.new("Build", "BUILD")
         built.frame_start, built.frame_duration = 5, 10

@@ -209,6 +209,13 @@ TEST_F(RenderTest, BodiesOfTrianglesAreSeenWhereTheyStand) {
     return count;
   };
   const int with = blue_pixels(record(scene, "with"));
+  // the same place, from far away
+  v1::MeshData& cube = *scene.mutable_colliders(0)->mutable_mesh()->mutable_data();
+  cube.mutable_poses()->add_times_s(0);
+  cube.mutable_poses()->add_times_s(0.01);
+  cube.mutable_poses()->set_positions_m(cube_mesh(0.1F, 0.9F, -0.35F, 0).positions_m() +
+                                        cube.positions_m());
+  EXPECT_EQ(blue_pixels(record(scene, "moved")), with);
   scene.clear_colliders();
   EXPECT_GT(with, blue_pixels(record(scene, "without")) + 75);
 }

@@ -259,6 +259,26 @@ class Plain(unittest.TestCase):
         finally:
             calls.MOST_INLINE = most
 
+    def test_bodies_move_through_poses(self):
+        corners, faces = octahedron(0.2)
+        lifted = weft.Poses([0.1, 0.3], [corners, corners + [0, 0.1, 0]])
+        body = weft.MeshData(None, faces, poses=lifted)
+        asset = self.server.upload(body)
+        self.assertEqual((asset.mesh.poses, asset.mesh.particles), (2, 6))
+        self.assertEqual(self.server.download(asset.name), body)
+
+        patch = weft.Sheet.mesh(*triangles(5, 5, 0.01), textile=weft.Textile.preset("denim_11oz"),
+                                placement=weft.Placement((-0.02, 0.202, -0.02)))
+        session = self.server.create_session(
+            weft.Scene([patch], [weft.Collider(weft.BodyMesh(asset.name, 0.01), name="ram")]))
+        session.step(24)
+        self.assertGreater(session.frame(24).positions[12, 1], 0.28)
+        with self.assertRaises(weft.InvalidArgument) as refused:
+            self.server.check(weft.Scene([patch], [weft.Collider.mesh(
+                corners, faces, poses=weft.Poses([1, 1], [corners, corners]))]))
+        self.assertEqual([each.field for each in refused.exception.violations],
+                         ["colliders[0].mesh.data.poses.times_s[1]"])
+
     def test_textiles_tests_and_facts_can_be_read(self):
         denim = self.server.textile("denim_11oz")
         self.assertIn(denim, self.server.textiles())

@@ -143,6 +143,36 @@ TEST_F(AssetTest, MayBeABodyWhichIsClosed) {
               ::testing::Contains("data.triangles"));
 }
 
+TEST_F(AssetTest, MayBeABodyInMotionWhosePosesFit) {
+  v1::MeshData cube = cube_mesh(0.1F, 0, 0, 0);
+  const std::string first = cube.positions_m(), next = cube_mesh(0.1F, 0, 1, 0).positions_m();
+  cube.clear_positions_m();
+  cube.mutable_poses()->add_times_s(0);
+  cube.mutable_poses()->add_times_s(0.5);
+  cube.mutable_poses()->set_positions_m(first + next);
+  const auto [asset, error] = upload(assets(), cube.SerializeAsString());
+  ASSERT_EQ(error.code, grpc::StatusCode::OK) << error.message;
+  EXPECT_EQ(asset.mesh().poses(), 2);
+  EXPECT_EQ(asset.mesh().particles(), 8);
+  EXPECT_NEAR(asset.mesh().flat_area_m2(), 6 * 0.04, 1e-6);
+
+  const auto fault = [&] {
+    const Error found = upload(assets(), cube.SerializeAsString()).second;
+    return found.fields().empty() ? "" : found.fields()[0];
+  };
+  cube.mutable_poses()->set_times_s(1, 0.005);  // 200 m/s
+  EXPECT_EQ(fault(), "data.poses.positions_m");
+  cube.mutable_poses()->set_times_s(1, 0);
+  EXPECT_EQ(fault(), "data.poses.times_s[1]");
+  cube.mutable_poses()->set_times_s(1, 1);
+  cube.set_positions_m(first + next);
+  EXPECT_THAT(upload(assets(), cube.SerializeAsString()).second.fields(),
+              ::testing::ElementsAre("data.poses", "data.positions_m"));
+  cube = square_mesh(1);
+  cube.mutable_poses()->add_times_s(0);
+  EXPECT_EQ(fault(), "data.flat_m");
+}
+
 TEST_F(AssetTest, IsListedInOrderOfNameOnPages) {
   std::vector<std::string> names;
   for (int cells = 1; cells <= 5; ++cells)

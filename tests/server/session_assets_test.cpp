@@ -94,7 +94,11 @@ TEST_F(SessionAssets, GoOnAfterARestartWithTheSameFrames) {
 
 TEST_F(SessionAssets, HoldTheMeshesOfBodiesAsThoseOfSheets) {
   v1::Scene scene = small_scene();
-  const v1::MeshData cube = cube_mesh(0.2F, 0.1F, -0.3F, 0.1F);
+  v1::MeshData cube = cube_mesh(0.2F, 0.1F, -0.3F, 0.1F);
+  const std::string risen = cube_mesh(0.25F, 0.1F, -0.25F, 0.1F).positions_m();
+  cube.mutable_poses()->add_times_s(0.05);
+  cube.mutable_poses()->add_times_s(1);
+  cube.mutable_poses()->set_positions_m(cube.positions_m() + risen);
   const std::string name = name_of_asset(cube.SerializeAsString());
   *scene.add_colliders()->mutable_mesh()->mutable_data() = cube;
   v1::Session session = service_->create(scene);
@@ -103,6 +107,7 @@ TEST_F(SessionAssets, HoldTheMeshesOfBodiesAsThoseOfSheets) {
   RestartWithSnapshots::kept(session);
   EXPECT_THAT(kept(), HasSubstr(name));
   EXPECT_THAT(kept(), Not(HasSubstr(cube.positions_m())));
+  EXPECT_THAT(kept(), Not(HasSubstr(risen)));
   restart();
   EXPECT_EQ(service_->get(session).scene().colliders(0).mesh().asset(), name);
   service_->step(session, 5);

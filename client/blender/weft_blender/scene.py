@@ -162,27 +162,24 @@ def _collider(world: World, name: str, body: Body, notes: list[str]) -> weft.Col
     surface = body.surface
     if not len(surface.triangles):
         raise Refused("has no faces; a body is a closed mesh, or a flat one: a floor", body.name)
-    fields = dict(name=name, friction_coefficient=body.friction, path=_path(world, body))
+    path, poses = _motion(world, body)
+    fields = dict(name=name, friction_coefficient=body.friction, path=path)
     normal, off = plane_of(surface)
     if not off.any():
+        if poses:
+            raise Refused("is flat, so it is a floor without end, which cannot turn", body.name)
         notes.append(f"{body.name}: is flat, so it is a floor without end")
         return weft.Collider(weft.Plane(surface.points[surface.triangles[0, 0]], normal), **fields)
-    return weft.Collider.mesh(surface.points, surface.triangles, **fields)
+    return weft.Collider.mesh(surface.points, surface.triangles, poses=poses, **fields)
 
 
-def _path(world: World, body: Body) -> list[weft.Keyframe]:
+def _motion(world: World, body: Body) -> tuple[list[weft.Keyframe], weft.Poses | None]:
+    """A path where it goes from place to place, else its poses."""
     if body.moves is None:
-        return []
+        return [], None
     away = body.moves - body.moves[0]
     offsets = away.mean(axis=1)
-    bent = np.linalg.norm(away - offsets[:, None], axis=2).max(axis=1)
-    most = STILL * np.linalg.norm(np.ptp(body.moves[0], axis=0))
-    if bent.max() > most:
-        first = world.first_frame + int(np.argmax(bent > most))
-        text = (
-            f"turns, grows or changes its shape by up to {bent.max():.3g} m, from frame {first} "
-            "on; the server leads bodies along paths, as they stand, and has no poses. Leave it "
-            "only motion from place to place"
-        )
-        raise Refused(text, body.name)
-    return keyframes(np.round(offsets, 6), world.frame_step_s)
+    bent = np.linalg.norm(away - offsets[:, None], axis=2).max()
+    if bent <= STILL * np.linalg.norm(np.ptp(body.moves[0], axis=0)):
+        return keyframes(np.round(offsets, 6), world.frame_step_s), None
+    return [], weft.Poses(np.arange(len(body.moves)) * world.frame_step_s, body.moves)

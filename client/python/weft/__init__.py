@@ -37,6 +37,7 @@ from .scene import (
     PinParticle,
     Placement,
     Plane,
+    Poses,
     RawTextile,
     Release,
     Scene,
@@ -54,7 +55,7 @@ __all__ = [
     "Drape", "Dressing", "EdgeRun", "Environment", "Error", "Frame", "Grab", "Grid", "Hand", "Hold",
     "InvalidArgument", "Isometric", "Keyframe", "MeasuredTextile", "MeshData", "MoveCollider",
     "NoConnection", "NotFound", "Panel", "Pattern", "PatternEdge", "PatternPanel", "PatternSeam",
-    "Pin", "PinParticle", "Placement", "Plane", "RawTextile", "Recording", "Release", "Scene",
-    "Server", "Session", "Sheet", "SolverSettings", "Sphere", "Textile", "TriangleSheet",
+    "Pin", "PinParticle", "Placement", "Plane", "Poses", "RawTextile", "Recording", "Release",
+    "Scene", "Server", "Session", "Sheet", "SolverSettings", "Sphere", "Textile", "TriangleSheet",
     "UnpinParticle", "Violation", "Wind", "aio", "connect", "errors", "open", "serve", "v1",
 ]

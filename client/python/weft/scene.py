@@ -99,6 +99,32 @@ class Panel(Value):
 
 
 @dataclass(eq=False)
+class Poses(Value):
+    """A body in motion: its vertices at given times, on straight ways between.
+
+    times_s         of each pose, s, rising
+    positions_m     (poses, n, 3) of all vertices in each, m
+    """
+
+    message = mesh_pb2.Poses
+    times_s: Sequence[float]
+    positions_m: npt.ArrayLike
+
+    def to_proto(self, path: str = "") -> Any:
+        at = (path + "." if path else "") + "positions_m"
+        given = np.asarray(self.positions_m)
+        data = b"".join(planes(pose, 3, "<f4", f"{at}[{i}]") for i, pose in enumerate(given))
+        return mesh_pb2.Poses(times_s=np.asarray(self.times_s).tolist(), positions_m=data)
+
+    @classmethod
+    def from_proto(cls, message: Any) -> "Poses":
+        positions = np.frombuffer(message.positions_m, "<f4")
+        count = len(message.times_s)
+        return cls(list(message.times_s), positions.reshape(count, 3, -1).swapaxes(1, 2)
+                   if count else positions)
+
+
+@dataclass(eq=False)
 class MeshData(Value):
     """Triangles, of sheets with their flat shape.
 
@@ -107,6 +133,7 @@ class MeshData(Value):
     flat_m          (k, 2) the flat shape, m: along the weft (u) and the warp (v)
     flat_triangles  (m, 3) corners of the flat shape; None: as triangles
     panels          runs of triangles; none: one panel
+    poses           how a body moves; None: it keeps its shape
     """
 
     message = mesh_pb2.MeshData
@@ -115,6 +142,7 @@ class MeshData(Value):
     flat_m: npt.ArrayLike | None = None
     flat_triangles: npt.ArrayLike | None = None
     panels: Sequence[Panel] = ()
+    poses: Poses | None = None
 
     def to_proto(self, path: str = "") -> Any:
         at = path + "." if path else ""
@@ -126,6 +154,8 @@ class MeshData(Value):
         if self.flat_triangles is not None:
             to.flat_triangles = row_bytes(self.flat_triangles, 3, "<u4", at + "flat_triangles")
         to.panels.extend(each.to_proto(f"{at}panels[{i}]") for i, each in enumerate(self.panels))
+        if self.poses is not None:
+            to.poses.CopyFrom(self.poses.to_proto(at + "poses"))
         return to
 
     @classmethod
@@ -143,6 +173,7 @@ class MeshData(Value):
             flat_m=columns(message.flat_m, 2),
             flat_triangles=None if flat_triangles is None else flat_triangles.reshape(-1, 3),
             panels=[Panel.from_proto(each) for each in message.panels],
+            poses=Poses.from_proto(message.poses) if message.HasField("poses") else None,
         )
 
 
@@ -337,11 +368,12 @@ class Collider(Value):
         vertices: npt.ArrayLike,
         faces: npt.ArrayLike,
         *,
+        poses: Poses | None = None,
         cell_m: float | None = None,
         **fields: Any,
     ) -> "Collider":
         """A closed surface: vertices (n, 3), m; faces (m, 3). `fields` are those of Collider."""
-        return cls(BodyMesh(MeshData(vertices, faces), cell_m), **fields)
+        return cls(BodyMesh(MeshData(vertices, faces, poses=poses), cell_m), **fields)
 
     @classmethod
     def load(

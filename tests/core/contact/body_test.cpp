@@ -15,54 +15,6 @@
 namespace weft::testing {
 namespace {
 
-Vector3d corner_of(const BodyMesh& mesh, const std::array<int, 3>& triangle, std::size_t k) {
-  return mesh.vertices[static_cast<std::size_t>(triangle[k])];
-}
-
-// By golden section along two edges: the squared distance is convex in the place on a triangle.
-double distance_from_triangle(const Vector3d& a, const Vector3d& b, const Vector3d& c,
-                              const Vector3d& point) {
-  const auto least = [](const auto& f) {
-    constexpr double kRatio = std::numbers::phi - 1;
-    double low = 0, high = 1, best = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < 40; ++i) {
-      const double one = high - kRatio * (high - low), other = low + kRatio * (high - low);
-      const double at_one = f(one), at_other = f(other);
-      best = std::min({best, at_one, at_other});
-      (at_one < at_other ? high : low) = at_one < at_other ? other : one;
-    }
-    return std::min({best, f(0.0), f(1.0)});
-  };
-  return std::sqrt(least([&](double u) {
-    return least([&](double v) {
-      return (a + u * (1 - v) * (b - a) + u * v * (c - a) - point).squaredNorm();
-    });
-  }));
-}
-
-// Solid angles (van Oosterom and Strackee 1983) over 4 pi: 1 inside, 0 outside.
-double winding(const BodyMesh& mesh, const Vector3d& point) {
-  double sum = 0;
-  for (const auto& triangle : mesh.triangles) {
-    const Vector3d a = corner_of(mesh, triangle, 0) - point,
-                   b = corner_of(mesh, triangle, 1) - point,
-                   c = corner_of(mesh, triangle, 2) - point;
-    const double p = a.norm(), q = b.norm(), r = c.norm();
-    sum +=
-        2 * std::atan2(a.dot(b.cross(c)), p * q * r + a.dot(b) * r + b.dot(c) * p + c.dot(a) * q);
-  }
-  return sum / (4 * std::numbers::pi);
-}
-
-double signed_distance(const BodyMesh& mesh, const Vector3d& point) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const auto& triangle : mesh.triangles)
-    least = std::min(
-        least, distance_from_triangle(corner_of(mesh, triangle, 0), corner_of(mesh, triangle, 1),
-                                      corner_of(mesh, triangle, 2), point));
-  return winding(mesh, point) > 0.5 ? -least : least;
-}
-
 std::vector<BodyMesh> meshes() {
   const Quaterniond turn(Eigen::AngleAxisd(0.6, Vector3d(1, 2, 3).normalized()));
   return {ball_mesh(0.1, 1), box_mesh({0.15, 0.1, 0.12}, turn),
@@ -133,8 +85,11 @@ TEST(Bodies, ThatEncloseNothingAreRefusedWithThePlace) {
   wrong.triangles[5][1] = 8;
   EXPECT_NE(fault(wrong).find("triangle 5 has a corner of index 8; there are 8"),
             std::string::npos);
-  wrong = box_mesh({0.1, 0.1, std::nan("")});
-  EXPECT_NE(fault(wrong).find("vertex 0"), std::string::npos);
+  for (const Eigen::Index axis : {0, 1, 2}) {
+    wrong = box_mesh({0.1, 0.1, 0.1});
+    wrong.vertices[3][axis] = std::nan("");
+    EXPECT_NE(fault(wrong).find("vertex 3"), std::string::npos) << axis;
+  }
   EXPECT_NE(fault(box_mesh({0.1, 0, 0.1})), "");
 }
 

@@ -108,7 +108,7 @@ TEST(Contact, NoBodyAndNoParticleCrossesTheOtherHoweverFastAndThin) {
     collider.path = {{0, Vector3d::Zero()}, {dt, -(speed - own) * dt * way}};
     const double start = -(half + skin) - uniform(random) * speed * dt;
     Vector3d d = own * dt * way, x = start * way + d;
-    const Contacts contacts(std::span(&collider, 1), 0.3, skin, dt, dt);
+    const Contacts contacts(std::span(&collider, 1), {}, 0.3, skin, dt, dt);
     const Vector3d before = x;
     const bool touched = contacts.resolve(x, d);
     const Vector3d seen = x - collider.path[1].offset;
@@ -137,7 +137,7 @@ TEST(Contact, AFastParticleInAWedgeEndsOutsideBothBodiesInEitherOrder) {
   const double skin = 1e-3;
   for (const auto& colliders : {std::vector{floor, ball}, std::vector{ball, floor}}) {
     Vector3d x(0.28, 0.01, 0), d(-0.03, -0.02, 0);
-    EXPECT_TRUE(Contacts(colliders, 0, skin, 1, 1e-3).resolve(x, d));
+    EXPECT_TRUE(Contacts(colliders, {}, 0, skin, 1, 1e-3).resolve(x, d));
     for (const Collider& collider : colliders)
       EXPECT_GE(distance(collider, x, 1).value, 0) << collider.shape.index();
   }
@@ -188,7 +188,9 @@ double steepest(const Collider& collider) {
 template <class T>
 void expect_rows_like_particles(const std::vector<Collider>& colliders) {
   const double tolerance = sizeof(T) == sizeof(float) ? 0x1p-46 : 0x1p-48;
-  const Contacts contacts(colliders, 0.4, 1e-3, 0.7, 0.1);
+  MovingBodies bodies(colliders);
+  bodies.place(0.7, 0.1);
+  const Contacts contacts(colliders, bodies, 0.4, 1e-3, 0.7, 0.1);
   Rows<T> rows, before;
   int touched = 0, i = 0;
   for (int row = 0; row < rows.kRows; ++row) {
@@ -197,9 +199,10 @@ void expect_rows_like_particles(const std::vector<Collider>& colliders) {
     for (int c = 0; c < rows.kColumns; ++c, ++i) {
       Vector3d x = before.x(i), d = before.d(i);
       if (i % 7 != 0) {
-        for (const Collider& collider : colliders)
+        for (std::size_t k = 0; k < colliders.size(); ++k)
           nearest = std::min(
-              nearest, (distance(collider, x, 0.7).value - contacts.skin()) / steepest(collider));
+              nearest, (distance(colliders[k], x, 0.7, bodies.of(k)).value - contacts.skin()) /
+                           steepest(colliders[k]));
         touched += contacts.resolve(x, d) ? 1 : 0;
       }
       EXPECT_LE((rows.x(i) - x).norm(), tolerance) << i;
@@ -245,6 +248,13 @@ TEST(Contact, OfARowInVectorsIsThatOfItsParticles) {
   all.push_back(solid(box_mesh(Vector3d(0.15, 0.1, 0.12), tilted())));
   all.back().path = {{0, Vector3d(0.2, -0.2, 0.2)}, {1, Vector3d(0.25, -0.2, 0.2)}};
   all[1].path = {{0, Vector3d::Zero()}, {1, Vector3d(0.05, 0, 0.1)}};
+  all.push_back(posed(
+      ball_mesh(0.15, 2), {0.1, 0.6, 0.8, 1.2},
+      [](const Vector3d& vertex, double time) {
+        return Vector3d((1 + 0.2 * time) * vertex +
+                        Vector3d(0.2, 0.1 * time - 0.2, 0.2 + 0.3 * vertex.x() * time));
+      },
+      0.08));
   for (const Collider& collider : all) {
     expect_rows_like_particles<float>({collider});
     expect_rows_like_particles<double>({collider});

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <functional>
+#include <vector>
+
 #include "core/contact/body.h"
 
 namespace weft::testing {
@@ -15,5 +18,19 @@ BodyMesh together(BodyMesh one, const BodyMesh& other, const Vector3d& moved);
 
 // A collider for sheets with skins up to 1 cm. Precondition: make_body() takes the mesh.
 Collider solid(const BodyMesh& mesh, double friction = 0.3);
+
+// Corner k of a triangle, m.
+Vector3d corner_of(const BodyMesh& mesh, const std::array<int, 3>& triangle, std::size_t k);
+
+// From all triangles and by solid angles: slow, and nothing else, m.
+double signed_distance(const BodyMesh& mesh, const Vector3d& point);
+
+// Where a vertex is at a time.
+using Way = std::function<Vector3d(const Vector3d& vertex, double time)>;
+// A collider with a pose for each of the times, for sheets with skins up to 1 mm.
+Collider posed(const BodyMesh& mesh, const std::vector<double>& times, const Way& way,
+               double cell = 5e-3, double friction = 0.3);
+// Its mesh between two poses: every vertex on its straight way.
+BodyMesh mesh_at(const Collider& body, double time);
 
 }  // namespace weft::testing

@@ -25,7 +25,7 @@ struct DrapeOptions {
   Person person;
   std::vector<std::string> bodies;
   std::string textile = "jersey_interlock";
-  std::optional<double> edge_m;
+  std::optional<double> edge_m, deflate_m;
   std::optional<v1::Accuracy> accuracy;
   double seconds = 20;
   std::string output, page, recording;
@@ -73,9 +73,10 @@ void check(const DrapeOptions& options) {
       throw unwritable(path, "the file exists; --force replaces it");
 }
 
-bool is_template(const std::string& name) {
-  const std::vector<GarmentInfo> all = garment_templates();
-  return std::ranges::any_of(all, [&](const GarmentInfo& each) { return each.name == name; });
+std::optional<GarmentInfo> template_called(const std::string& name) {
+  for (const GarmentInfo& each : garment_templates())
+    if (each.name == name) return each;
+  return std::nullopt;
 }
 
 // What goes on at a time.
@@ -108,11 +109,23 @@ RecordingResult dress(Context& context, const v1::Session& session, const DrapeO
   return result;
 }
 
-std::string verdict_text(const v1::Verdict& verdict, const Tally& tally) {
+// What is wrong with the start, which seldom ends well.
+std::vector<v1::Warning> faults_of_start(const v1::Plan& plan) {
+  std::vector<v1::Warning> faults;
+  for (const v1::Warning& warning : plan.warnings())
+    if (warning.code() == "STARTS_INSIDE" || warning.code() == "TANGLED_START")
+      faults.push_back(warning);
+  return faults;
+}
+
+std::string verdict_text(const v1::Verdict& verdict, const std::vector<v1::Warning>& start,
+                         const Tally& tally) {
   Facts facts;
   facts.add("verdict", verdict.good() ? "good" : "not good");
   for (const v1::Fault& fault : verdict.faults())
     facts.add("fault", fmt::format("{}: {}", fault.code(), fault.message()));
+  for (const v1::Warning& warning : start)
+    facts.add("start", fmt::format("{}: {}", warning.code(), warning.message()));
   facts.add("rest", verdict.at_rest() ? fmt::format("after {:.2f} s", tally.last_time_s)
                                       : fmt::format("not within {:.2f} s", tally.last_time_s));
   facts.add("cuts", fmt::format("{} at the end, {} in the worst frame", verdict.cloth_cut_count(),
@@ -138,12 +151,14 @@ GarmentOrder read_order(const DrapeOptions& options, std::string& notes) {
   GarmentOrder order;
   order.textile = textile_named(options.textile);
   order.edge_m = options.edge_m;
-  const bool own = is_template(options.garment);
+  order.deflate_m = options.deflate_m;
+  const std::optional<GarmentInfo> own = template_called(options.garment);
   std::optional<DressForm> form;
   if (own || options.bodies.empty()) form = make_dress_form(measures_of(options.person));
   if (own) {
     order.name = options.garment;
     order.pattern = make_garment(options.garment, *form);
+    if (!order.deflate_m && own->deflate_m > 0) order.deflate_m = own->deflate_m;
   } else {
     order.name = plain_name(std::filesystem::path(options.garment).stem().string(), "garment");
     ImportedPattern read = read_pattern(options.garment);
@@ -203,7 +218,9 @@ void run_drape(Context& context, const DrapeOptions& options) {
   ask.set_name(session.name());
   const v1::Verdict verdict = context.connection().call(&Sessions::GetVerdict, ask);
   Json document{{"garment", made.json}, {"verdict", to_json(verdict)}, {"session", session.name()}};
-  text += made.text + verdict_text(verdict, result.tally);
+  const std::vector<v1::Warning> start = faults_of_start(session.plan());
+  for (const v1::Warning& warning : start) document["start"].push_back(to_json(warning));
+  text += made.text + verdict_text(verdict, start, result.tally);
   write_files(options, order.name, recorded, result.tally.last_frame, document, text);
   context.answer(document, text);
   if (!verdict.good()) throw not_good(verdict);
@@ -234,6 +251,11 @@ void add_drape(CLI::App& app, Context& context) {
       ->capture_default_str();
   command->add_option("--edge", options->edge_m, "Wanted length of triangles' edges, m; else 0.01")
       ->type_name("M");
+  command
+      ->add_option("--deflate", options->deflate_m,
+                   "By how much bodies are smaller while seams close, m, so that thighs part; else "
+                   "0.02 for trousers")
+      ->type_name("M");
   add_accuracy(*command, options->accuracy);
   command->add_option("--seconds", options->seconds, "Most simulated time until it is at rest, s")
       ->type_name("S")
@@ -247,9 +269,9 @@ void add_drape(CLI::App& app, Context& context) {
   command->add_flag("--force", options->replace, "Replace files that exist");
   command->footer(R"(
 Panels start where the pattern places them. Seams close, without weight, then
-weight comes in; edges with the label "waist" are held up meanwhile. It ends at
-rest with a verdict, and exit code 1 where that is not good. On a server that is
-named the session stays.
+weight comes in; edges with the label "waist", or else the highest border of
+what has no shoulders, are held up meanwhile. It ends at rest with a verdict, and
+exit code 1 where that is not good. On a server that is named the session stays.
   weft drape tshirt --size 40 -o tshirt.glb --page tshirt.html
   weft drape pattern.json --body body.obj --textile denim_11oz -o out.glb
 )");

@@ -64,7 +64,7 @@ void run_import(Context& context, const ImportOptionsOfPattern& options) {
 
 struct BuildOptions {
   std::string pattern, path;
-  std::optional<double> edge_m;
+  std::optional<double> edge_m, deflate_m;
   std::string textile = "wool_tropical";
   std::vector<std::string> panel_textiles, bodies;
   bool replace = false;
@@ -86,7 +86,8 @@ void run_build(Context& context, const BuildOptions& options) {
       .name = plain_name(std::filesystem::path(options.pattern).stem().string(), "garment"),
       .pattern = std::move(read.pattern),
       .textile = textile_named(options.textile),
-      .edge_m = options.edge_m};
+      .edge_m = options.edge_m,
+      .deflate_m = options.deflate_m};
   for (const std::string& path : options.bodies) order.bodies.push_back(garment_body(path));
   GarmentScene made = make_garment_scene(context.connection(), order);
   std::string text;
@@ -135,8 +136,8 @@ void add_import(CLI::App& group, Context& context) {
              "Pattern file to write; else it goes to stdout");
   command->footer(R"(
 Panels keep their names, made plain, edges their numbers, and all their places,
-in m. Panels drawn from the back are mirrored. Meshes (.obj, .glb) are sewn
-already: weft scene new --mesh takes them.
+in m. Panels drawn from the back are mirrored; lower_interface is a waist.
+Meshes (.obj, .glb) are sewn already: weft scene new --mesh takes them.
 )");
   command->callback([&context, options] { run_import(context, *options); });
 }
@@ -164,6 +165,10 @@ void add_build(CLI::App& group, Context& context) {
                    "Closed triangles that wear it: .obj, .gltf or .glb; may be given again")
       ->type_name("FILE")
       ->allow_extra_args(false);
+  command
+      ->add_option("--deflate", options->deflate_m,
+                   "By how much bodies are smaller while seams close, m, so that thighs part")
+      ->type_name("M");
   add_output(*command, options->path, options->replace,
              "Scene file to write; else the pattern is looked at alone");
   command->footer(R"(

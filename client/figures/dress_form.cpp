@@ -249,7 +249,7 @@ class FigureShape {
     double d = from_torso(p);
     if (plan_.breast) d = blend(d, from_blob(p, *plan_.breast), 0.045);
     d = blend(d, from_leg(p), 0.045);
-    if (p.x() < 0.08) d = blend(d, from_leg({-p.x(), p.y(), p.z()}), 0.045);
+    if (p.x() < 0.08) d = blend(d, from_leg({-p.x(), p.y(), p.z()}), 0.012);
     d = blend(d, from_shoulder(p), 0.05);
     d = blend(d, from_arm(p), 0.04);
     return blend(d, from_blob(p, plan_.head), 0.03);

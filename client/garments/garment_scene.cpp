@@ -101,6 +101,7 @@ GarmentScene make_garment_scene(Connection& connection, const GarmentOrder& orde
   for (const v1::Collider& body : order.bodies) *made.scene.add_colliders() = body;
   made.scene.set_cloth_contact(true);
   *made.scene.mutable_dressing() = built.dressing();
+  if (order.deflate_m) made.scene.mutable_dressing()->set_deflate_m(*order.deflate_m);
   return made;
 }
 

@@ -37,6 +37,15 @@ class Surroundings {
         most = std::max(most, at.y());
     return most;
   }
+  // Where the legs part, m.
+  double crotch() const {
+    constexpr double kNear = 0.01;
+    const double hip = form_.girth("hip").height;
+    double least = hip;
+    for (const Vector3d& at : form_.mesh.vertices)
+      if (std::abs(at.x()) < kNear && at.y() > hip / 2) least = std::min(least, at.y());
+    return least;
+  }
 
  private:
   const DressForm& form_;
@@ -335,6 +344,108 @@ v1::Pattern shirt(const DressForm& form) {
   return draft.take();
 }
 
+// A leg's front or back: heights, and widths from the middle of the body outwards.
+struct LegPiece {
+  double waist, waist_half, hip, hip_half, crotch, fork, hem, hem_width;
+  double dart_width, dart_depth;  // 0: none
+};
+
+// With the middle of the body at u = 0, the fork beyond it.
+Outline leg_outline(const LegPiece& p) {
+  const double rise = p.waist - p.crotch, fall = p.waist - p.hip, dart = p.dart_width;
+  const double middle = (p.hip_half - p.fork) / 2;  // of the leg
+  Outline outline({middle - p.hem_width / 2, p.hem});
+  outline.line("hem", {middle + p.hem_width / 2, p.hem});
+  outline.line("low-side", {p.hip_half, p.hip});
+  outline.curve("side", {Vector2d(p.hip_half, p.hip + 0.45 * fall),
+                         Vector2d(p.waist_half + dart + 0.006, p.waist - 0.3 * fall),
+                         Vector2d(p.waist_half + dart, p.waist)});
+  if (dart > 0) {
+    const double at = (p.waist_half + dart) / 2;
+    outline.line("waist-1", {at + dart / 2, p.waist});
+    outline.line("dart-1", {at, p.waist - p.dart_depth});
+    outline.line("dart-2", {at - dart / 2, p.waist});
+    outline.line("waist-2", {0, p.waist});
+  } else {
+    outline.line("waist-1", {0, p.waist});
+  }
+  outline.curve("rise", {Vector2d(0, p.crotch + 0.25 * rise), Vector2d(-0.1 * p.fork, p.crotch),
+                         Vector2d(-p.fork, p.crotch)});
+  outline.line("inseam", {middle - p.hem_width / 2, p.hem});
+  return outline;
+}
+
+// In front of the left leg, or behind the right one; the inseam hangs straight down between them.
+PanelPlace leg_place(const LegPiece& p, const Surroundings& body, bool front) {
+  constexpr double kApart = 0.006, kWide = 0.25;
+  const double side = front ? 1 : -1;
+  const double lean = std::atan2((p.hip_half + p.fork - p.hem_width) / 2, p.crotch - p.hem);
+  const double z = body.depth(side, p.hem, p.waist, kWide) + side * kClear;
+  PanelPlace place{{0, 0, z}, Quaterniond(Eigen::AngleAxisd(-side * lean, Vector3d::UnitZ()))};
+  if (!front) place = behind(place, z);
+  place.origin +=
+      Vector3d(side * kApart, p.crotch, 0) - place.rotation * Vector3d(-p.fork, p.crotch, 0);
+  return place;
+}
+
+// A band's front or back, whose lower edge is in two halves.
+Outline halved_band(double half, double low, double height, bool front) {
+  const std::string here = front ? "left" : "right", there = front ? "right" : "left";
+  Outline outline({-half, low});
+  outline.line(of_side("lower", there).c_str(), {0, low});
+  outline.line(of_side("lower", here).c_str(), {half, low});
+  outline.line(of_side("side", here).c_str(), {half, low + height});
+  outline.line("upper", {-half, low + height});
+  outline.line(of_side("side", there).c_str(), {-half, low});
+  return outline;
+}
+
+v1::Pattern trousers(const DressForm& form) {
+  constexpr double kBand = 0.035, kBelow = 0.015;
+  const Surroundings body(form);
+  Draft draft;
+  const double hip = form.girth("hip").wanted;
+  LegPiece piece{};
+  piece.waist = form.girth("waist").height - kBand / 2;
+  piece.waist_half = 0.98 * form.girth("waist").wanted / 4;  // stays up by it
+  piece.hip = form.girth("hip").height;
+  piece.crotch = body.crotch() - kBelow;
+  piece.hem = 0.07 * form.stature;
+  for (const bool front : {true, false}) {
+    const std::string name = front ? "front" : "back";
+    piece.hip_half = (hip + 0.05) / 4 + (front ? -0.005 : 0.005);
+    piece.fork = (front ? 0.055 : 0.105) * hip;
+    piece.hem_width = (front ? 0.2 : 0.22) * hip;
+    piece.dart_width = front ? 0 : 0.025;
+    piece.dart_depth = 0.11;
+    const Outline leg = leg_outline(piece);
+    const PanelPlace place = leg_place(piece, body, front);
+    const std::string here = name + (front ? "-left" : "-right"),
+                      there = name + (front ? "-right" : "-left");
+    draft.add(here, leg, place);
+    draft.add(there, leg.mirrored(), mirrored(place));
+    const Outline band = halved_band(piece.waist_half, piece.waist + 0.01, kBand, front);
+    draft.add("band-" + name, band, (front ? front_of : back_of)(band, body), std::numbers::pi / 2);
+    draft.sew({here, {"rise"}}, {there, {"rise"}});
+    for (const std::string side : kSides) {
+      const std::string panel = name + "-" + side;
+      std::vector<std::string> waist{"waist-1"};
+      if (!front) {
+        draft.sew({panel, {"dart-1"}}, {panel, {"dart-2"}});
+        waist.emplace_back("waist-2");
+        if (panel == there) std::ranges::reverse(waist);
+      }
+      draft.sew({panel, waist}, {"band-" + name, {of_side("lower", side)}});
+    }
+  }
+  for (const std::string side : kSides) {
+    for (const char* label : {"low-side", "side", "inseam"})
+      draft.sew({"front-" + side, {label}}, {"back-" + side, {label}});
+    draft.sew({"band-front", {of_side("side", side)}}, {"band-back", {of_side("side", side)}});
+  }
+  return draft.take();
+}
+
 struct Template {
   GarmentInfo info;
   v1::Pattern (*make)(const DressForm&);
@@ -343,6 +454,8 @@ const std::vector<Template>& all_templates() {
   static const std::vector<Template> all = {
       {{"tshirt", "A T-shirt: front, back, sleeves of two halves"}, tshirt},
       {{"skirt", "A skirt to the knee: front and back with darts, a waistband"}, skirt},
+      {{"trousers", "Trousers to the ankle: legs of a front and a back, a waistband", 0.02},
+       trousers},
       {{"dress", "A dress to the knee: a fitted top with sleeves, a gathered skirt"}, dress},
       {{"shirt", "A loose shirt with long sleeves and a stand-up collar, without an opening"},
        shirt},

@@ -11,6 +11,7 @@ namespace weft::client {
 struct GarmentInfo {
   std::string name;
   std::string description;
+  double deflate_m = 0;  // by which bodies want to be smaller while it is put on
 };
 std::vector<GarmentInfo> garment_templates();
 

@@ -128,11 +128,16 @@ class PatternReading {
         edge->add_points_m(rounded(point.y()));
       }
       edge->set_arc(lines[e].arc);
-      if (edges[e].contains("label") && edges[e].at("label").is_string() &&
-          !edges[e].at("label").get<std::string>().empty())
-        edge->set_label(plain_name(edges[e].at("label").get<std::string>()));
+      if (edges[e].contains("label")) read_label(edges[e].at("label"), *edge);
     }
     place_panel(panel, place, middle, turned, *to->mutable_placement());
+  }
+
+  // What GarmentCode holds up it calls lower_interface.
+  static void read_label(const Json& given, v1::PatternEdge& edge) {
+    if (!given.is_string()) return;
+    const std::string label = given.get<std::string>();
+    if (!label.empty()) edge.set_label(label == "lower_interface" ? "waist" : plain_name(label));
   }
 
   std::string free_name(const std::string& given) {

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <iterator>
-#include <set>
 
 #include "core/model/text.h"
+#include "core/pattern/held.h"
 #include "server/convert/mesh.h"
 
 namespace weft {
@@ -75,16 +75,6 @@ class PatternReader {
   std::vector<Problem> problems_;
 };
 
-// Waists are held up.
-void set_dressing(v1::BuildGarmentResponse& built) {
-  std::set<int> waist;
-  for (const v1::BuiltEdge& edge : built.edges())
-    if (edge.label() == "waist" || edge.label().starts_with("waist-"))
-      waist.insert(edge.particles().begin(), edge.particles().end());
-  v1::Dressing* dressing = built.mutable_dressing();
-  if (!waist.empty()) dressing->add_holds()->mutable_particles()->Add(waist.begin(), waist.end());
-}
-
 v1::BuildGarmentResponse to_proto(Garment garment, const v1::Pattern& pattern, double edge) {
   v1::BuildGarmentResponse to;
   to.set_least_height(garment.least_height / edge);
@@ -103,7 +93,6 @@ v1::BuildGarmentResponse to_proto(Garment garment, const v1::Pattern& pattern, d
     added->mutable_particles()->Assign(each.particles.begin(), each.particles.end());
     added->set_length_m(each.length);
   }
-  set_dressing(to);
   v1::MeshData* mesh = to.mutable_sheet()->mutable_triangles()->mutable_data();
   *mesh = to_proto(complete(std::move(garment.mesh)));
   for (int p = 0; p < pattern.panels_size(); ++p)
@@ -126,7 +115,12 @@ Converted<v1::BuildGarmentResponse> build_garment(const v1::BuildGarmentRequest&
   }
   auto built = build_garment(pattern, edge, "pattern", "edge_m");
   if (auto* found = std::get_if<std::vector<Problem>>(&built)) return std::move(*found);
-  return to_proto(std::get<Garment>(std::move(built)), request.pattern(), edge);
+  Garment& garment = std::get<Garment>(built);
+  const std::vector<int> held = held_particles(pattern, garment);
+  v1::BuildGarmentResponse response = to_proto(std::move(garment), request.pattern(), edge);
+  v1::Dressing* dressing = response.mutable_dressing();
+  if (!held.empty()) dressing->add_holds()->mutable_particles()->Assign(held.begin(), held.end());
+  return response;
 }
 
 }  // namespace weft

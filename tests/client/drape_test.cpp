@@ -35,7 +35,7 @@ std::string pole_obj() {
 }
 
 // Two rectangles in front of the pole and behind it, sewn at their sides, with a waist on top.
-v1::Pattern tube_pattern(double girth) {
+v1::Pattern tube_pattern(double girth, double away = 0.15) {
   v1::Pattern pattern;
   const double half = girth / 4;
   for (const bool back : {false, true}) {
@@ -51,7 +51,7 @@ v1::Pattern tube_pattern(double girth) {
     edge(half, 0.2);
     edge(-half, 0.2, "waist");
     edge(-half, 0);
-    panel->mutable_placement()->mutable_origin_m()->set_z(back ? -0.15 : 0.15);
+    panel->mutable_placement()->mutable_origin_m()->set_z(back ? -away : away);
     if (back) {
       panel->mutable_placement()->mutable_rotation()->set_w(0);
       panel->mutable_placement()->mutable_rotation()->set_y(1);
@@ -69,9 +69,9 @@ v1::Pattern tube_pattern(double girth) {
 
 class Drape : public ClientTest {
  protected:
-  Outcome drape(double girth, std::vector<std::string> options) {
+  Outcome drape(double girth, std::vector<std::string> options, double away = 0.15) {
     write_file(path("pole.obj"), pole_obj());
-    write_file(path("tube.json"), client::pattern_text(tube_pattern(girth)));
+    write_file(path("tube.json"), client::pattern_text(tube_pattern(girth, away)));
     std::vector<std::string> arguments{"drape",          path("tube.json"), "--body",
                                        path("pole.obj"), "--edge",          "0.03"};
     arguments.insert(arguments.end(), options.begin(), options.end());
@@ -99,6 +99,13 @@ TEST_F(Drape, OfWhatIsTooWideSlidesDownAndIsNotGood) {
   EXPECT_EQ(outcome.exit, 1);
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("not a good drape"), HasSubstr("SLID_DOWN")));
   EXPECT_THAT(outcome.out, HasSubstr("verdict   not good"));
+}
+
+TEST_F(Drape, SaysWhatIsWrongWithItsStart) {
+  const Outcome outcome = drape(0.62, {"--seconds", "0.1"}, 0.05);
+  EXPECT_THAT(outcome.out, HasSubstr("start     STARTS_INSIDE: "));
+  EXPECT_THAT(drape(0.62, {"--seconds", "0.1", "--deflate", "0.2"}).err,
+              HasSubstr("dressing.deflate_m: 0.2 m is not within 0 to 0.1 m"));
 }
 
 TEST_F(Drape, ReplacesAFileOnlyWhenAsked) {

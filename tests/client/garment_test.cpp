@@ -123,6 +123,15 @@ TEST(GarmentCode, RightSidesSewnToWrongOnesRunInTheSameDirection) {
   EXPECT_FALSE(imported(json).pattern.seams(1).same_direction());
 }
 
+TEST(GarmentCode, WhatItHoldsUpIsAWaist) {
+  Json json = two_panels();
+  json["pattern"]["panels"]["Front"]["edges"][2]["label"] = "lower_interface";
+  json["pattern"]["panels"]["Front"]["edges"][0]["label"] = "Left Collar";
+  const v1::PatternPanel front = imported(json).pattern.panels(0);
+  EXPECT_EQ(front.edges(2).label(), "waist");
+  EXPECT_EQ(front.edges(0).label(), "left_collar");
+}
+
 TEST(GarmentCode, FaultsAreToldWithFilePanelAndEdge) {
   const auto with = [](const std::function<void(Json&)>& change) {
     Json json = two_panels();
@@ -244,6 +253,32 @@ TEST_F(Garment, WhatCannotBeSewnIsToldByItsPlaceInTheFile) {
   EXPECT_THAT(refused.err, Not(HasSubstr("pattern.")));
 }
 
+TEST_F(Garment, WithoutAWaistItsHighestBorderIsHeldUnlessItHasShoulders) {
+  const auto held = [&](const Json& pattern) {
+    write_file(path("it.json"), pattern.dump());
+    const Outcome built = run_weft({"--json", "garment", "build", path("it.json"), "--edge", "0.03",
+                                    "-o", path("scene.json"), "--force"});
+    EXPECT_EQ(built.exit, 0) << built.err;
+    const v1::Scene scene = client::read_scene(path("scene.json"));
+    std::set<int> all, waist;
+    for (const v1::Hold& hold : scene.dressing().holds())
+      all.insert(hold.particles().begin(), hold.particles().end());
+    const nlohmann::json edges = built.json()["edges"];
+    for (const auto& edge : edges)
+      if (edge.value("edge", 0) == (edge["panel"] == "front" ? 2 : 1))
+        for (const int i : edge["particles"]) waist.insert(i);
+    return std::pair(all, waist);
+  };
+  Json json = two_panels();
+  json["pattern"]["panels"]["Front"]["edges"][2].erase("label");
+  const auto [all, waist] = held(json);
+  EXPECT_EQ(all, waist);
+  EXPECT_THAT(
+      held(Json::parse(client::pattern_text(client::make_garment("tshirt", client::Measures{}))))
+          .first,
+      ::testing::IsEmpty());
+}
+
 TEST_F(Garment, TemplatesAreListedAndNamed) {
   const Outcome help = run_weft({"garment", "new", "--help"});
   for (const auto& info : client::garment_templates()) EXPECT_THAT(help.out, HasSubstr(info.name));
@@ -310,9 +345,10 @@ INSTANTIATE_TEST_SUITE_P(Sizes, GarmentTemplates,
                          });
 
 TEST_F(Garment, AWaistbandFollowsTheWaistAskedFor) {
-  for (const double waist : {0.66, 0.8}) {
-    const std::string pattern = path(std::to_string(waist) + ".json");
-    ASSERT_EQ(run_weft({"garment", "new", "skirt", "--waist", std::to_string(waist), "--hip",
+  for (const auto& [garment, waist] :
+       {std::pair("skirt", 0.66), std::pair("skirt", 0.8), std::pair("trousers", 0.72)}) {
+    const std::string pattern = path(garment + std::to_string(waist) + ".json");
+    ASSERT_EQ(run_weft({"garment", "new", garment, "--waist", std::to_string(waist), "--hip",
                         std::to_string(waist + 0.24), "-o", pattern})
                   .exit,
               0);

@@ -19,10 +19,9 @@ int parts_of(const Poses& poses, std::size_t pose, double cell) {
 
 // Around its middle.
 Vector3d place_at(const Poses& poses, std::size_t pose, double share, std::size_t vertex) {
-  const Vector3d from = poses.position(pose, vertex) - poses.middles[pose];
-  if (share == 0) return from;
-  const Vector3d to = poses.position(pose + 1, vertex) - poses.middles[pose + 1];
-  return from + share * (to - from);
+  Vector3d at = poses.position(pose, vertex) - poses.middles[pose];
+  if (share > 0) at += share * (poses.position(pose + 1, vertex) - poses.middles[pose + 1] - at);
+  return at;
 }
 
 Vector3d middle_at(const Poses& poses, std::size_t pose, double time) {

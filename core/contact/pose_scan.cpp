@@ -53,8 +53,9 @@ void scan_all(std::span<const ScannedTriangle> triangles, const Vector3d& low, d
   const Vector3d to_middle = (kBlock - 1) * cell / 2 * Vector3d(1, 1, 0);  // of a layer
   alignas(64) float along_x[kLayer], along_y[kLayer];
   for (int i = 0; i < kLayer; ++i) {
-    along_x[i] = static_cast<float>(i % kBlock * cell);
-    along_y[i] = static_cast<float>(i / kBlock * cell);
+    const int column = i % kBlock, row = i / kBlock;
+    along_x[i] = static_cast<float>(column * cell);
+    along_y[i] = static_cast<float>(row * cell);
   }
 
   for (const ScannedTriangle& t : triangles) {

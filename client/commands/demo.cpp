@@ -141,7 +141,7 @@ PageOrder plan_page(const DemoOptions& options, const std::vector<Run>& runs,
       .title = "Dressed",
       .caption =
           "A T-shirt of jersey, from a pattern in panels to rest on a dress form of size "
-          "40: seams close, then weight comes in. `weft drape tshirt --size 40` does it "
+          "40: seams close, then weight comes in. weft drape tshirt --size 40 does it "
           "with finer triangles.",
       .exhibits = {exhibit("T-shirt", "tshirt")}};
   dressed.exhibits.front().facts = {{"verdict", runs.back().verdict},

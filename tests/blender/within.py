@@ -89,6 +89,22 @@ class Drapes(unittest.TestCase):
         simulate()
         self.assertGreater(look(thing, 30)[:, 2].max(), 0.75)
 
+    def test_a_body_that_turns_and_grows_takes_the_cloth_along(self):
+        body = ball()
+        for frame, turn, size in (1, 0, 1), (10, 0, 1), (30, 0.8, 1.3):
+            body.rotation_euler[2], body.scale = turn, (size, size, size)
+            body.keyframe_insert("rotation_euler", frame=frame)
+            body.keyframe_insert("scale", frame=frame)
+        thing = cloth()
+        thing.location[2] = 0.32
+        simulate()
+        collider = work().simulation.run.prepared.scene.colliders[0]
+        self.assertEqual(len(collider.shape.source.poses.times_s), 30)
+        low, high = look(thing, 10), look(thing, 30)
+        self.assertGreater(high[:, 2].max(), low[:, 2].max() + 0.08)  # a ball of 0.3
+        edge = high[10] - high[0]  # along x at first
+        self.assertGreater(np.arctan2(edge[1], edge[0]), 0.2)
+
     def test_a_wind_field_blows_along_its_z_at_its_strength(self):
         bpy.ops.object.effector_add(type="WIND", rotation=(0, np.pi / 2, 0))
         bpy.context.object.field.strength = 4

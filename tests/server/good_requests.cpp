@@ -123,14 +123,14 @@ v1::Scene full_scene() {
   capsule->set_radius_m(0.1);
   v1::BodyMesh* body = scene.add_colliders()->mutable_mesh();
   *body->mutable_data() = cube_mesh(0.1F, 4, -2, 0);
-  body->set_cell_m(0.01);
+  body->set_cell_m(0.04);
   v1::Poses* poses = body->mutable_data()->mutable_poses();
   poses->add_times_s(150);  // after any dressing
   poses->add_times_s(151);
   poses->set_positions_m(body->data().positions_m() + cube_mesh(0.1F, 4, -1.9F, 0).positions_m());
   v1::BodyMesh* uploaded_body = scene.add_colliders()->mutable_mesh();
   uploaded_body->set_asset(name_of_asset(known_body()));
-  uploaded_body->set_cell_m(0.02);
+  uploaded_body->set_cell_m(0.04);
   for (v1::Collider& collider : *scene.mutable_colliders()) {
     collider.set_friction_coefficient(0.2);
     add_path(&collider);

@@ -22,6 +22,7 @@ void Repairs::set(int halvings, int instead_of, StepPlan& step) const {
 }
 
 bool Repairs::grow(std::int64_t frame, StepPlan& step) {
+  if (halvings_ == 0 || all_.empty()) return false;
   constexpr std::int64_t kGood = 64;
   constexpr int kMostDoublings = 10;
   int lasting = 0, times = 0;
@@ -33,7 +34,7 @@ bool Repairs::grow(std::int64_t frame, StepPlan& step) {
   }
   if (halvings_ <= lasting || 2 * step.substep > step.linear_bound) return false;
   const std::int64_t good = frame - 1 - last;
-  if (good == 0 || good % (kGood << std::min(times - 1, kMostDoublings)) != 0) return false;
+  if (good == 0 || good % (kGood << std::clamp(times - 1, 0, kMostDoublings)) != 0) return false;
   set(halvings_ - 1, halvings_, step);
   --halvings_;
   return true;

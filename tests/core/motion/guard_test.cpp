@@ -80,6 +80,8 @@ TEST(Guard, TheStepGrowsAgainAfterGoodFramesTwiceAsManyEachTimeFramesBreak) {
   EXPECT_FALSE(repairs.grow(90 + 128 + 1, step)) << "twice the planned step is above its bound";
   step.substep /= 4;
   EXPECT_TRUE(repairs.grow(90 + 128 + 1, step));
+  repairs.adopt(2, {});
+  EXPECT_FALSE(repairs.grow(65, step)) << "nothing says since when";
   repairs.adopt(1, {{5, 0, "", true}});
   EXPECT_FALSE(repairs.grow(5 + 64 + 1, step)) << "where energy came from nothing it stays";
 }

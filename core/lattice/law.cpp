@@ -140,11 +140,15 @@ void set_columns(double edge_share, SweepLaw<T>& law) {
 
   law.halo_exists = AlignedArray<T>(2 * layout.kHalo * kLanes);
   law.halo_folds = AlignedArray<T>(2 * layout.kHalo * kLanes);
+  law.halo_from = AlignedArray<LaneNumber<T>>(2 * layout.kHalo * kLanes);
+  law.halo_to = AlignedArray<LaneNumber<T>>(2 * layout.kHalo * kLanes);
   for (int k = 0; k < 2 * layout.kHalo; ++k) {
     for (int lane = 0; lane < kLanes; ++lane) {
       law.halo_exists.data()[k * kLanes + lane] = bits(has(layout.column(layout.halo(k), lane)));
       const int from = lane - layout.halo_shift(k);
       law.halo_folds.data()[k * kLanes + lane] = bits(from >= 0 && from < kLanes);
+      law.halo_from.data()[k * kLanes + lane] = (lane + layout.halo_shift(k)) & (kLanes - 1);
+      law.halo_to.data()[k * kLanes + lane] = from & (kLanes - 1);
     }
   }
 }

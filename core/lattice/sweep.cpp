@@ -127,8 +127,17 @@ class Sweep {
     const D d;
     return {hn::Load(d, p), hn::Load(d, p + kLanes), hn::Load(d, p + 2 * kLanes)};
   }
-  static HWY_INLINE Triple<V> load_shifted(const T* p) {
+  // From `shift` lanes on, which lanes has the numbers of; what is of no run there is anything.
+  // Vectors are read as they were stored: the processor waits where a load takes of two stores.
+  static HWY_INLINE Triple<V> load_shifted(const T* p, int shift, const LaneNumber<T>* lanes) {
     const D d;
+    if constexpr (kPart == kLanes) {
+      const auto from = hn::SetTableIndices(d, lanes);
+      const Triple<V> v = load(p);
+      return {hn::TableLookupLanes(v.x, from), hn::TableLookupLanes(v.y, from),
+              hn::TableLookupLanes(v.z, from)};
+    }
+    p += shift;
     return {hn::LoadU(d, p), hn::LoadU(d, p + kLanes), hn::LoadU(d, p + 2 * kLanes)};
   }
   static HWY_INLINE void store(const Triple<V>& v, T* p) {
@@ -150,34 +159,41 @@ class Sweep {
     const D d;
     if (r >= law_.layout.rows) return;
     T* const row = state_.shared(band_, r);
-    const auto copy = [&](const T* from, T* to, const T* mask) HWY_ATTR {
+    const auto mask = [&](T* to, const T* exists, const auto& value) HWY_ATTR {
       for (int part = 0; part < kLanes; part += kPart) {
-        const V exists = hn::Load(d, mask + part);
+        const V here = hn::Load(d, exists + part);
         for (int plane = 0; plane < planes_; plane += 3) {
           const int at = plane * kLanes + part;
-          store(only(load_shifted(from + at), exists), to + at);
+          store(only(value(at), here), to + at);
         }
       }
     };
-    for (const int j : law_.padded)
-      copy(row + j * kShared, row + j * kShared,
-           law_.columns.data() + (j * kColumnPlanes + kHere) * kLanes);
-    for (std::size_t k = 0; k < halo_.size(); ++k)
-      copy(row + halo_[k].vector * kShared + halo_[k].shift, row + halo_[k].at * kShared,
-           law_.halo_exists.data() + k * kLanes);
+    for (const int j : law_.padded) {
+      T* const padded = row + j * kShared;
+      mask(padded, law_.columns.data() + (j * kColumnPlanes + kHere) * kLanes,
+           [&](int at) HWY_ATTR { return load(padded + at); });
+    }
+    for (std::size_t k = 0; k < halo_.size(); ++k) {
+      const T* const from = row + halo_[k].vector * kShared;
+      mask(row + halo_[k].at * kShared, law_.halo_exists.data() + k * kLanes, [&](int at) HWY_ATTR {
+        return load_shifted(from + at, halo_[k].shift, law_.halo_from.data() + k * kLanes);
+      });
+    }
   }
 
   // Moves the forces on row r's halo to the particles meant.
   void fold(int r) const {
     const D d;
     T* const row = forces(r);
-    for (std::size_t k = 0; k < halo_.size(); ++k)
+    for (std::size_t k = 0; k < halo_.size(); ++k) {
+      const LaneNumber<T>* const lanes = law_.halo_to.data() + k * kLanes;
       for (int part = 0; part < kLanes; part += kPart) {
         const V mask = hn::Load(d, law_.halo_folds.data() + k * kLanes + part);
-        const T* const from = row + halo_[k].at * kForces + part - halo_[k].shift;
+        const T* const from = row + halo_[k].at * kForces + part;
         T* const to = row + halo_[k].vector * kForces + part;
-        store(plus(load(to), only(load_shifted(from), mask)), to);
+        store(plus(load(to), only(load_shifted(from, -halo_[k].shift, lanes), mask)), to);
       }
+    }
     // for row r + 3; to the right of it, too, nothing is left of these
     for (std::size_t k = 0; k < (kStartsRows ? kHalo : halo_.size()); ++k)
       for (int part = 0; part < kLanes; part += kPart)

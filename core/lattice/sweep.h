@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "core/forces/wind_law.h"
@@ -39,6 +41,10 @@ enum class BendKind {
   kPolynomial,
   kIsometric
 };
+
+// As large as a value.
+template <class T>
+using LaneNumber = std::conditional_t<sizeof(T) == 4, std::int32_t, std::int64_t>;
 
 // What the columns of a vector differ in.
 enum ColumnPlane {
@@ -80,6 +86,8 @@ struct SweepLaw {
   // all bits, else none: where a column of the halo exists, and which lanes of the vector that it
   // continues it holds
   AlignedArray<T> halo_exists, halo_folds;  // (2 kHalo x lanes)
+  // which lanes of the vector that it continues it holds, and the other way round
+  AlignedArray<LaneNumber<T>> halo_from, halo_to;  // (2 kHalo x lanes)
 };
 
 // One substep of eq. 2 to 8 over the whole lattice, in one sweep over its rows: every connection

@@ -303,7 +303,7 @@ void warn_of_damping(const Scene& scene, const std::vector<PlannedSheet>& planne
               kSafeDampingRatio, " would need none of that")});
 }
 
-void warn_of_body(const Scene& scene, std::size_t index, const Body& body, Plan& plan) {
+void warn_of_body(std::size_t index, const Body& body, Plan& plan) {
   const std::string field = join("colliders[", index, "].mesh");
   for (const std::string& note : body.notes) plan.warnings.push_back({"BODY_MENDED", field, note});
   constexpr double kFewCells = 2;
@@ -314,15 +314,22 @@ void warn_of_body(const Scene& scene, std::size_t index, const Body& body, Plan&
               " m thick, less than two of its cells of ", body.grid.cell,
               " m: so thin a part holds cloth only from its edges, or not at all. Give a smaller "
               "cell_m")});
+}
+
+void warn_of_start_inside(const Scene& scene, std::size_t index, Plan& plan) {
   const Contacts contacts(std::span(&scene.colliders[index], 1), {}, 0, 0, 0, 0);
   for (const SheetDefinition& sheet : scene.sheets) {
     const Matrix3Xd x = start_positions(sheet);
+    std::vector<bool> held(static_cast<std::size_t>(x.cols()));
+    for (const Pin& pin : sheet.pins)
+      for (const int i : pin.particles) held[static_cast<std::size_t>(i)] = true;
     int inside = 0, first = 0;
     for (Eigen::Index i = 0; i < x.cols(); ++i)
-      if (contacts.gap(x.col(i)) < 0 && inside++ == 0) first = static_cast<int>(i);
+      if (!held[static_cast<std::size_t>(i)] && contacts.gap(x.col(i)) < 0 && inside++ == 0)
+        first = static_cast<int>(i);
     if (inside > 0)
       plan.warnings.push_back(
-          {"STARTS_INSIDE", field,
+          {"STARTS_INSIDE", join("colliders[", index, "]"),
            join(inside, " particles of sheet \"", sheet.name, "\" start inside, the first of them ",
                 first, ": they are pushed out at ", Contacts::kOutward, " m/s")});
   }
@@ -345,7 +352,8 @@ void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
            "edge helps"});
   for (std::size_t c = 0; c < scene.colliders.size(); ++c)
     if (const auto* body = std::get_if<SharedBody>(&scene.colliders[c].shape))
-      warn_of_body(scene, c, **body, plan);
+      warn_of_body(c, **body, plan);
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c) warn_of_start_inside(scene, c, plan);
   for (std::size_t s = 0; s < planned.size(); ++s) {
     if (std::holds_alternative<Triangles>(scene.sheets[s].shape)) {
       warn_of_triangles(scene, s, planned[s], steps[s].limiting_particle, plan);
@@ -364,6 +372,32 @@ void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
 }
 
 }  // namespace
+
+std::span<const std::string_view> warning_codes() {
+  static constexpr std::string_view kCodes[] = {"BENDING_TOO_UNEQUAL",
+                                                "BODY_MENDED",
+                                                "BODY_THIN",
+                                                "BOX_EDGES",
+                                                "CLAMP_RULES",
+                                                "COMPRESSION_SOFTENS",
+                                                "MESH_DEPENDENT",
+                                                "MESH_TOO_COARSE",
+                                                "MESH_TOO_FINE",
+                                                "NO_SELF_COLLISION",
+                                                "NO_SHEET_SHEET_COLLISION",
+                                                "SHEAR_STIFFENS_TENSION",
+                                                "SLIVER",
+                                                "STARTS_INSIDE",
+                                                "STEP_UNSTABLE",
+                                                "STRETCH_CAPPED",
+                                                "TANGLED_START",
+                                                "TETHERS_IDLE",
+                                                "TETHERS_STIFFEN",
+                                                "TETHERS_STRAIGHT",
+                                                "TETHERS_TAUT",
+                                                "UNDERDAMPED"};
+  return kCodes;
+}
 
 std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver,
                                         std::int64_t most_substeps) {

@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/model/mesh.h"
@@ -26,10 +28,12 @@ struct SkippedPass {
 };
 
 struct Warning {
-  std::string code;
+  std::string code;   // one of warning_codes()
   std::string field;  // path in a scene file; empty: the whole scene
   std::string message;
 };
+
+std::span<const std::string_view> warning_codes();
 
 // Where interlaced connections bend a sheet as its rigidity says, and where they no longer do.
 struct BendingLimit {

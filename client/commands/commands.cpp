@@ -61,6 +61,15 @@ void add_session_argument(CLI::App& command, std::string& session) {
   command.add_option("SESSION", session, "Name of the session")->option_text(" ")->required();
 }
 
+void add_refuse_option(CLI::App& command, std::vector<std::string>& codes) {
+  command
+      .add_option("--refuse", codes,
+                  "Warnings that are errors here: codes, such as STARTS_INSIDE,TANGLED_START")
+      ->type_name("CODE,...")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+}
+
 void add_session_or_scene_argument(CLI::App& command, std::string& given) {
   command.add_option("SESSION", given, "Name of the session, or a scene file (see --embedded)")
       ->option_text(" ")

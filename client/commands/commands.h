@@ -91,6 +91,7 @@ Measures measures_of(const Person& person);
 
 // The positional SESSION.
 void add_session_argument(CLI::App& command, std::string& session);
+void add_refuse_option(CLI::App& command, std::vector<std::string>& codes);
 void add_session_or_scene_argument(CLI::App& command, std::string& given);
 void add_accuracy(CLI::App& command, std::optional<v1::Accuracy>& accuracy);
 

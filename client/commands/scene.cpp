@@ -125,9 +125,16 @@ std::int64_t particles_of(const v1::Sheet& sheet) {
                                        : mesh.positions_m().size() / kPosition);
 }
 
-void run_check(Context& context, const std::string& path) {
+struct CheckOptions {
+  std::string path;
+  std::vector<std::string> refused;
+};
+
+void run_check(Context& context, const CheckOptions& options) {
+  const auto& [path, refused] = options;
   v1::CreateSessionRequest request;
   request.set_validate_only(true);
+  request.mutable_refused_warnings()->Add(refused.begin(), refused.end());
   context.prefer_embedded();
   const v1::Scene scene = read_scene(path);
   const v1::Session session = create_session(context.connection(), scene, request);
@@ -156,6 +163,7 @@ A mesh becomes a sheet of triangles: its flat shape is its UV, a panel is a
 group (g) of an OBJ file where it has several, else a material (usemtl), else an
 object (o); of glTF a primitive. Polygons are cut into triangles. What was found
 is said: panels, borders, seams, scale, the triangles that keep the step short.
+It does not pass through itself, unless --set cloth_contact=false.
 Top is +y and right +x, as seen from the front. Lines of C-IPC, "stitch POINT A B
 SHARE" in an OBJ file, sew a point to the nearer of two, in the mean of their
 places; without UV the flat shape is then the planes of the pieces. What cannot
@@ -262,12 +270,13 @@ void add_new(CLI::App& scene, Context& context) {
 }
 
 void add_check(CLI::App& scene, Context& context) {
-  auto path = std::make_shared<std::string>();
+  auto options = std::make_shared<CheckOptions>();
   CLI::App* command =
       scene.add_subcommand("check", "Say what the solver would do, or all that is wrong");
   command->alias("explain");
-  command->add_option("FILE", *path, "Scene file")->option_text(" ")->required();
-  command->callback([&context, path] { run_check(context, *path); });
+  command->add_option("FILE", options->path, "Scene file")->option_text(" ")->required();
+  add_refuse_option(*command, options->refused);
+  command->callback([&context, options] { run_check(context, *options); });
 }
 
 }  // namespace

@@ -13,10 +13,12 @@ using google::protobuf::util::TimeUtil;
 struct CreateOptions {
   std::string path;
   std::string id;
+  std::vector<std::string> refused;
 };
 
 void run_create(Context& context, const CreateOptions& options) {
   v1::CreateSessionRequest request;
+  request.mutable_refused_warnings()->Add(options.refused.begin(), options.refused.end());
   request.set_session_id(options.id);
   const v1::Session session =
       create_session(context.connection(), read_scene(options.path), request);
@@ -113,6 +115,7 @@ void add_session(CLI::App& app, Context& context) {
   command->add_option("FILE", create->path, "Scene file")->option_text(" ")->required();
   command->add_option("--id", create->id, "Name of the session; else the server picks one")
       ->type_name("NAME");
+  add_refuse_option(*command, create->refused);
   command->callback([&context, create] { run_create(context, *create); });
 
   command = session->add_subcommand("list", "List all sessions");

@@ -38,6 +38,7 @@ void set_textiles(v1::Sheet& sheet, const MeshSceneOptions& options) {
 v1::Scene make_mesh_scene(const std::string& path, const ImportedMesh& mesh,
                           const MeshSceneOptions& options) {
   v1::Scene scene;
+  scene.set_cloth_contact(true);
   v1::Sheet* sheet = scene.add_sheets();
   sheet->set_name(plain_name(std::filesystem::path(path).stem().string(), "sheet"));
   *sheet->mutable_triangles()->mutable_data() = mesh_data(mesh, options.grain_rad);

@@ -62,6 +62,31 @@ grpc::Status refused_step(const Simulation& simulation, const StepRefusal& refus
   return errors::step_unstable(refusal, solver + (asked ? "substep_s" : "integrator"));
 }
 
+std::vector<Problem> unknown_codes(const v1::CreateSessionRequest& request) {
+  constexpr int kMost = 64;
+  const auto& codes = request.refused_warnings();
+  if (codes.size() > kMost)
+    return {{"refused_warnings",
+             "has " + std::to_string(codes.size()) + " codes, more than " + std::to_string(kMost)}};
+  std::vector<Problem> problems;
+  const auto known = warning_codes();
+  for (int k = 0; k < codes.size(); ++k)
+    if (std::find(known.begin(), known.end(), codes[k]) == known.end())
+      problems.push_back({"refused_warnings[" + std::to_string(k) + "]",
+                          "is \"" + codes[k] + "\", which is no code of a warning"});
+  return problems;
+}
+
+std::vector<Problem> refused_warnings(const Plan& plan, const v1::CreateSessionRequest& request) {
+  std::vector<Problem> problems;
+  const auto& codes = request.refused_warnings();
+  for (const Warning& warning : plan.warnings)
+    if (std::find(codes.begin(), codes.end(), warning.code) != codes.end())
+      problems.push_back({"session.scene" + (warning.field.empty() ? "" : "." + warning.field),
+                          warning.code + ", which is refused: " + warning.message});
+  return problems;
+}
+
 grpc::Status refused(const Registry::Refused& refused, const Caller& caller,
                      const std::string& id) {
   if (const auto* exists = std::get_if<Registry::Exists>(&refused)) {
@@ -175,6 +200,9 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
     return errors::field_invalid("session.scene", "is absent");
   }
 
+  if (const auto problems = unknown_codes(request); !problems.empty())
+    return errors::field_invalid(problems);
+
   // everything that is wrong with the scene, and its size, before anything is made of it
   const auto mesh = [&](const std::string& asset) {
     return find_mesh(backend_.store->assets(), caller, asset);
@@ -198,6 +226,8 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
   Simulation simulation(std::move(scene));
   simulation.limit_frame_work(backend_.limits.max_frame_work);
   if (const auto refusal = simulation.refusal()) return refused_step(simulation, *refusal);
+  if (const auto problems = refused_warnings(simulation.plan(), request); !problems.empty())
+    return errors::field_invalid(problems);
   const auto session = make_session(id, caller, std::move(simulation), 0);
   response = to_proto(*session);
   if (request.validate_only()) {

@@ -279,6 +279,18 @@ TEST_F(CommandsTest, ATextileOfOnesOwnIsAFileThatIsTakenWhereAPresetIs) {
   EXPECT_EQ(tested["values"][0]["asked"], 30);
 }
 
+TEST_F(CommandsTest, ASceneWithARefusedWarningIsAnError) {
+  const std::string scene = path("scene.json");
+  ASSERT_EQ(weft({"scene", "new", "--template", "sphere", "-o", scene}).exit, 0);
+  EXPECT_EQ(weft({"scene", "check", scene, "--refuse", "STARTS_INSIDE"}).exit, 0);
+  for (const std::string command : {"check", "create"}) {
+    const Outcome refused = weft({command == "check" ? "scene" : "session", command, scene,
+                                  "--refuse", "STARTS_INSIDE,NO_SELF_COLLISION"});
+    EXPECT_EQ(refused.exit, 1) << command;
+    EXPECT_THAT(refused.err, HasSubstr("NO_SELF_COLLISION, which is refused")) << command;
+  }
+}
+
 TEST_F(CommandsTest, ATextileMayBeginWithAnotherAndItsValuesAreChecked) {
   const std::string file = path("denser.json");
   ASSERT_EQ(

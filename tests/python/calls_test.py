@@ -163,6 +163,13 @@ class Plain(unittest.TestCase):
         session = self.server.create_session(weft.Scene(FALL.sheets, [ball]))
         self.assertEqual(session.move_collider((0, 0.5, 0), over=0.1, collider="ball"), 1)
 
+    def test_a_scene_with_a_refused_warning_makes_no_session(self):
+        codes = ["TANGLED_START", "NO_SELF_COLLISION"]
+        with self.assertRaises(weft.InvalidArgument) as refused:
+            self.server.create_session(FALL, refused_warnings=codes)
+        self.assertEqual(refused.exception.violations[0].field, "session.scene")
+        self.server.check(FALL, refused_warnings=codes[:1])
+
     def test_a_session_goes_on_from_a_snapshot(self):
         session = self.server.create_session(hung(), "kept")
         session.step(10)

@@ -7,6 +7,7 @@
 namespace weft::testing {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -56,6 +57,32 @@ TEST(Errors, OfAMissingSceneSheetOrTextileNameIt) {
   empty_sheet.add_sheets();
   EXPECT_THAT(service.create_error(empty_sheet).fields(),
               ElementsAre("session.scene.sheets[0].mesh", "session.scene.sheets[0].textile"));
+}
+
+TEST(Errors, AreWarningsThatACallRefuses) {
+  Service service;
+  v1::Scene scene = small_scene();
+  auto* ball = scene.add_colliders()->mutable_sphere();
+  ball->set_radius_m(0.06);
+  service.create(scene, "pushed-out");
+
+  v1::CreateSessionRequest request;
+  *request.mutable_session()->mutable_scene() = scene;
+  request.add_refused_warnings("TANGLED_START");
+  request.add_refused_warnings("STARTS_INSIDE");
+  const Error error = service.error(&Sessions::CreateSession, request);
+  expect_error(error, grpc::StatusCode::INVALID_ARGUMENT, "FIELD_INVALID");
+  EXPECT_THAT(error.fields(), ElementsAre("session.scene.colliders[0]"));
+  EXPECT_THAT(error.bad.field_violations(0).description(),
+              AllOf(HasSubstr("STARTS_INSIDE"), HasSubstr("start inside, the first of them ")));
+
+  ball->mutable_center_m()->set_y(-1);
+  *request.mutable_session()->mutable_scene() = scene;
+  EXPECT_EQ(service.error(&Sessions::CreateSession, request).code, grpc::StatusCode::OK);
+
+  request.add_refused_warnings("INSIDE");
+  EXPECT_THAT(service.error(&Sessions::CreateSession, request).fields(),
+              ElementsAre("refused_warnings[2]"));
 }
 
 TEST(Errors, OfBodiesNameThePlaceWhereTheyAreOpen) {

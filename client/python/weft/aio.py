@@ -119,14 +119,18 @@ class Server:
             if not request.page_token:
                 return found
 
-    async def check(self, scene: Scene) -> session_pb2.Session:
-        return await self._create(scene, "", True)
+    async def check(
+        self, scene: Scene, *, refused_warnings: Sequence[str] = ()
+    ) -> session_pb2.Session:
+        return await self._create(scene, "", True, refused_warnings)
 
-    async def create_session(self, scene: Scene, session_id: str = "") -> "Session":
-        return Session(self, await self._create(scene, session_id, False))
+    async def create_session(
+        self, scene: Scene, session_id: str = "", *, refused_warnings: Sequence[str] = ()
+    ) -> "Session":
+        return Session(self, await self._create(scene, session_id, False, refused_warnings))
 
     async def _create(
-        self, scene: Scene, session_id: str, validate_only: bool
+        self, scene: Scene, session_id: str, validate_only: bool, refused_warnings: Sequence[str]
     ) -> session_pb2.Session:
         message = scene.to_proto()
         for path, source in calls.large_meshes(message):
@@ -136,7 +140,7 @@ class Server:
             except InvalidArgument as wrong:
                 raise calls.at(path, wrong) from None
         session: session_pb2.Session = await self.call(
-            calls.create_request(message, session_id, validate_only)
+            calls.create_request(message, session_id, validate_only, refused_warnings)
         )
         return session
 

@@ -9,7 +9,7 @@ import pathlib
 import re
 import time
 import uuid
-from typing import Any, Iterable, Iterator, cast
+from typing import Any, Iterable, Iterator, Sequence, cast
 
 import grpc
 
@@ -293,8 +293,12 @@ def session_name(name: str) -> str:
     return name if name.startswith("sessions/") else "sessions/" + name
 
 
-def create_request(scene: Any, session_id: str, validate_only: bool) -> Any:
-    request = session_pb2.CreateSessionRequest(session_id=session_id, validate_only=validate_only)
+def create_request(
+    scene: Any, session_id: str, validate_only: bool, refused_warnings: Sequence[str]
+) -> Any:
+    request = session_pb2.CreateSessionRequest(
+        session_id=session_id, validate_only=validate_only, refused_warnings=refused_warnings
+    )
     request.session.scene.CopyFrom(scene)
     return request
 

@@ -132,7 +132,9 @@ class Server:
 
     # sessions
 
-    def check(self, scene: Scene) -> session_pb2.Session:
+    def check(
+        self, scene: Scene, *, refused_warnings: Sequence[str] = ()
+    ) -> session_pb2.Session:
         """The session that a scene would be, with its plan: step, cost and warnings.
         InvalidArgument has every reason why it cannot be one.
 
@@ -141,13 +143,18 @@ class Server:
         Traceback (most recent call last):
         weft.errors.InvalidArgument: sheets[0].grid.rows: 1 is not within 2 to 4096
         """
-        return self._create(scene, "", True)
+        return self._create(scene, "", True, refused_warnings)
 
-    def create_session(self, scene: Scene, session_id: str = "") -> "Session":
-        """A session, paused at frame 0. Larger meshes go up as assets first."""
-        return Session(self, self._create(scene, session_id, False))
+    def create_session(
+        self, scene: Scene, session_id: str = "", *, refused_warnings: Sequence[str] = ()
+    ) -> "Session":
+        """A session, paused at frame 0. Larger meshes go up as assets first. InvalidArgument where
+        its plan has one of the warnings refused, by their codes, such as STARTS_INSIDE."""
+        return Session(self, self._create(scene, session_id, False, refused_warnings))
 
-    def _create(self, scene: Scene, session_id: str, validate_only: bool) -> session_pb2.Session:
+    def _create(
+        self, scene: Scene, session_id: str, validate_only: bool, refused_warnings: Sequence[str]
+    ) -> session_pb2.Session:
         message = scene.to_proto()
         for path, source in calls.large_meshes(message):
             try:
@@ -155,7 +162,7 @@ class Server:
             except InvalidArgument as wrong:
                 raise calls.at(path, wrong) from None
         session: session_pb2.Session = self.call(
-            calls.create_request(message, session_id, validate_only)
+            calls.create_request(message, session_id, validate_only, refused_warnings)
         )
         return session
 

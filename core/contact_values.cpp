@@ -130,25 +130,29 @@ std::vector<double> ContactMeter::clearances(const std::shared_ptr<const Scene>&
   const std::lock_guard lock(mutex_);
   bodies_.place(time, 0);
   const double deflate = scene->dressing ? dressing_at(*scene->dressing, time).deflate : 0;
-  std::vector<int> nearest(scene->colliders.size());
-  std::vector<double> values;
   const Planes all = planes_of(positions);
-  for (Eigen::Index i = 0; i < all.rows(); ++i)
-    values.push_back(clearance(*scene, all.row(i).transpose(), time, nearest) + deflate);
+  std::vector<double> values(static_cast<std::size_t>(all.rows()));
+  for (Surface& surface : surfaces_) surface.nearest.resize(values.size(), -1);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] =
+        clearance(*scene, all.row(static_cast<Eigen::Index>(i)).transpose(), time, i) + deflate;
   return values;
 }
 
-// nearest: triangle of each body, of a place nearby.
 double ContactMeter::clearance(const Scene& scene, const Vector3d& x, double time,
-                               std::vector<int>& nearest) {
+                               std::size_t particle) {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < scene.colliders.size(); ++c) {
     const Collider& collider = scene.colliders[c];
     double value = distance(collider, x, time, bodies_.of(c)).value;
     if (std::holds_alternative<SharedBody>(collider.shape)) {
       const Vector3d at = x - offset_at(collider.path, time);
-      const auto found = tree_of(collider, surfaces_[c], time).nearest(at, nearest[c]);
-      nearest[c] = found.triangle;
+      Surface& surface = surfaces_[c];
+      // a guess makes it quick: where it was, or where its neighbour is
+      int& nearest = surface.nearest[particle];
+      if (nearest < 0) nearest = particle > 0 ? surface.nearest[particle - 1] : 0;
+      const auto found = tree_of(collider, surface, time).nearest(at, nearest);
+      nearest = found.triangle;
       value = std::copysign(std::sqrt(found.squared), value);
     }
     least = std::min(least, value);

@@ -51,10 +51,11 @@ class ContactMeter {
     BodyMesh mesh;
     std::unique_ptr<TriangleTree> tree;
     double time = 0;
+    std::vector<int> nearest;  // triangle of each particle when it was last asked for, or -1
   };
 
   void take(const std::shared_ptr<const Scene>& scene, double time);
-  double clearance(const Scene& scene, const Vector3d& x, double time, std::vector<int>& nearest);
+  double clearance(const Scene& scene, const Vector3d& x, double time, std::size_t particle);
   const TriangleTree& tree_of(const Collider& collider, Surface& surface, double time);
 
   mutable std::mutex mutex_;

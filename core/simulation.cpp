@@ -407,8 +407,13 @@ void Simulation::copy_velocities(std::span<double> out) const {
 
 std::shared_ptr<const Scene> Simulation::scene_of_frame() const {
   auto& shared = state_->scene_of_frame;
-  if (!shared) shared = std::make_shared<const Scene>(state_->scene);
-  return shared;
+  if (shared) return shared;
+  Scene scene = state_->scene;
+  for (SheetDefinition& sheet : scene.sheets) {
+    sheet.start_velocities = {};
+    if (!scene.dressing) sheet.start_positions = {};  // else seams close from there
+  }
+  return shared = std::make_shared<const Scene>(std::move(scene));
 }
 
 VectorXd Simulation::pressures(std::size_t sheet) const {

@@ -87,7 +87,8 @@ class Simulation {
   FrameStats stats() const;
   // How the sheets sit, which takes about as long as some substeps.
   Verdict verdict() const;
-  // The scene with the textiles, pins and paths of the last frame; the same until they change.
+  // The scene with the textiles, pins and paths of the last frame, without a start that nothing
+  // depends on any more; the same until they change.
   std::shared_ptr<const Scene> scene_of_frame() const;
   // What colliders press each particle of a sheet with, Pa, see core/contact_values.h.
   VectorXd pressures(std::size_t sheet) const;

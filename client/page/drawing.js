@@ -394,7 +394,8 @@ class Pane {
     this.grid.material.color.copy(linear(style('--grid')));
     for (const {material} of this.lines.children) material.color.copy(linear(style('--lines')));
     this.flat?.lines.material.color.copy(linear(style('--lines')));
-    for (const {material} of [this.pins, this.held, this.mark, this.flat?.mark ?? this.mark]) material.color.copy(linear(style('--accent')));
+    const points = [this.pins, this.held, this.mark, this.flat?.mark];
+    for (const each of points) each?.material.color.copy(linear(style('--accent')));
   }
 
   // Goes to time t; between frames where `between`, else at the frame before.

@@ -397,7 +397,37 @@ test('a point is marked on the cloth and on its pattern, with its panel and valu
   await close();
 });
 
-test('bodies and sheets are shown or not', async () => {
+test('one of two sheets is hidden, in space and on the pattern', async () => {
+  const {sheets: [sheet], ...scene} = sewn();
+  const over = {...sheet, name: 'over', placement: {origin_m: {...sheet.placement.origin_m, y: 0.3}}};
+  writeFileSync(file('layers.json'), JSON.stringify({...scene, sheets: [sheet, over]}));
+  weft('record', file('layers.json'), '--embedded', '--to', '5', '-o', file('layers.weft'));
+  weft('view', file('layers.weft'), '-o', file('layers.html'));
+  const {page, close} = await open('layers.html');
+  await page.keyboard.press('u');
+  await page.locator('#colour').selectOption('panels');
+  await settle(page);
+  assert.deepEqual((await page.locator('#cut span').allTextContents()).map(plain),
+    ['cloth left', 'cloth right', 'over left', 'over right']);
+  const both = await canvas(page);
+  await picture(page, 'layers');
+  await page.locator('#layers-button').click();
+  await page.getByLabel('over').uncheck();
+  await page.keyboard.press('Escape');
+  await settle(page);
+  const one = await canvas(page);
+  assert.notEqual(one, both);
+  await picture(page, 'layers-one');
+  await page.locator('#layers-button').click();
+  await page.getByLabel('over').check();
+  await page.getByLabel('cloth').uncheck();
+  await page.keyboard.press('Escape');
+  await settle(page);
+  assert.notEqual(await canvas(page), one);
+  await close();
+});
+
+test('bodies are shown or not', async () => {
   const {page, close} = await open('shirt.html');
   await page.keyboard.press('End');
   await settle(page);

@@ -8,9 +8,11 @@
 namespace weft::client {
 
 void FrameParts::begin(const v1::StreamHeader& header) {
-  constexpr std::size_t kMostArrays = 3, kMostBytes = 3 * sizeof(double);
+  // three arrays of three numbers of each particle, and two of one; three of each triangle
+  constexpr std::size_t kOfParticles = 3 * 3 + 2, kOfTriangles = 3;
   most_bytes_ =
-      1024 + 2 * kMostBytes * (kMostArrays * particle_count(header) + triangle_count(header));
+      1024 + 2 * sizeof(double) *
+                 (kOfParticles * particle_count(header) + kOfTriangles * triangle_count(header));
   frame_.Clear();
 }
 
@@ -26,6 +28,8 @@ bool FrameParts::join(v1::Frame& part) {
     frame_.mutable_velocities_m_per_s()->append(part.velocities_m_per_s());
     frame_.mutable_normals()->append(part.normals());
     frame_.mutable_strain()->append(part.strain());
+    frame_.mutable_pressure_pa()->append(part.pressure_pa());
+    frame_.mutable_clearance_m()->append(part.clearance_m());
     frame_.set_continued(part.continued());
     part.Swap(&frame_);
   }

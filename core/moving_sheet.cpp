@@ -15,13 +15,13 @@ void MovingSheet::set_definition(const Scene& scene, const SheetDefinition& defi
   else if (!definition.textile.damping)
     made.damping = std::max(kDefaultDamping, damping_of(definition, made, kSafeDampingRatio));
   set_mesh(scene, definition, std::move(made));
-  skin = definition.skin_or_default();
 }
 
 void MovingSheet::set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made) {
   mesh = std::move(made);
   if (dressing.ease < 1) ease_rest_shape(definition, dressing.ease, mesh);
   if (!scene.environment.wind) mesh.triangles = std::vector<std::array<int, 3>>();
+  skin = definition.skin_or_default();
   set_pins(definition);
   set_air_and_weight(scene);
 }
@@ -37,7 +37,7 @@ void MovingSheet::set_air_and_weight(const Scene& scene) {
 
 void MovingSheet::remake_mesh(const Scene& scene, const SheetDefinition& definition) {
   Mesh made = make_mesh(definition);
-  made.damping = mesh.damping;  // costs more to find than all else
+  made.damping = mesh.damping;
   set_mesh(scene, definition, std::move(made));
 }
 

@@ -27,6 +27,8 @@ struct MovingSheet {
 
   // Mesh, forces and skin of a definition: its textile as it is simulated, and its pins.
   void set_definition(const Scene& scene, const SheetDefinition& definition);
+  // The same anew, with the damping that it has: that costs more to find than all else.
+  void remake_mesh(const Scene& scene, const SheetDefinition& definition);
   // Mesh and forces as they are while the sheet is put on; what stays is not made anew.
   void dress(const Scene& scene, const SheetDefinition& definition, const DressingState& state);
   // Lets go of what follows from the definition, but for its damping, until it is restored by the
@@ -55,7 +57,6 @@ struct MovingSheet {
  private:
   // These take what `dressing` says into account.
   void set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made);
-  void remake_mesh(const Scene& scene, const SheetDefinition& definition);
   void set_air_and_weight(const Scene& scene);
 
   mutable SheetState good_;  // empty: not looked at since

@@ -6,6 +6,7 @@
 
 #include "core/cloth_contact/tangles.h"
 #include "core/contact/contact.h"
+#include "core/contact_values.h"
 #include "core/forces/air.h"
 #include "core/forces/elastic.h"
 #include "core/model/self_weight.h"
@@ -209,17 +210,9 @@ bool Simulation::State::quiet(const NextStates& next) const {
   return true;
 }
 
-// A sheet as it is simulated, but for its damping.
-SheetDefinition Simulation::State::capped(std::size_t sheet) const {
-  SheetDefinition definition = scene.sheets[sheet];
-  if (const auto& strain = scene.solver.max_self_weight_strain)
-    cap_stretch(definition, scene.environment, *strain);
-  return definition;
-}
-
 // A sheet as it is simulated, once it has a mesh.
 SheetDefinition Simulation::State::simulated(std::size_t sheet) const {
-  SheetDefinition definition = capped(sheet);
+  SheetDefinition definition = capped(scene, sheet);
   definition.textile.damping = sheets[sheet].mesh.damping;
   return definition;
 }
@@ -233,7 +226,7 @@ Simulation::State::State(Scene given, SolverFactory factory)
       repairs(scene.solver) {
   std::vector<Matrix3Xd> x(sheets.size());
   for (std::size_t s = 0; s < sheets.size(); ++s) {
-    const SheetDefinition definition = capped(s);
+    const SheetDefinition definition = capped(scene, s);
     if (scene.dressing) sheets[s].dressing = dressing_at(*scene.dressing, 0);
     sheets[s].set_definition(scene, definition);
     sheets[s].bind_forces(scene);
@@ -291,7 +284,7 @@ void Simulation::State::release_memory() {
 // Before anything but the scene, the plan and counts is looked at.
 void Simulation::State::restore_memory() {
   if (!released) return;
-  for (std::size_t s = 0; s < sheets.size(); ++s) sheets[s].restore_memory(scene, capped(s));
+  for (std::size_t s = 0; s < sheets.size(); ++s) sheets[s].restore_memory(scene, capped(scene, s));
   make_cloth_contact();
   released = false;
 }
@@ -410,6 +403,17 @@ void Simulation::copy_velocities(std::span<double> out) const {
     copy_planes(sheet.good().v, first, out);
     first += sheet.good().v.cols();
   }
+}
+
+std::shared_ptr<const Scene> Simulation::scene_of_frame() const {
+  auto& shared = state_->scene_of_frame;
+  if (shared) return shared;
+  Scene scene = state_->scene;
+  for (SheetDefinition& sheet : scene.sheets) {
+    sheet.start_velocities = {};
+    if (!scene.dressing) sheet.start_positions = {};  // else seams close from there
+  }
+  return shared = std::make_shared<const Scene>(std::move(scene));
 }
 
 VectorXd Simulation::pressures(std::size_t sheet) const {

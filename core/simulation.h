@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/mesh.h"
 #include "core/model/scene.h"
 #include "core/motion/thread_pool.h"
 #include "core/plan.h"
@@ -86,7 +87,10 @@ class Simulation {
   FrameStats stats() const;
   // How the sheets sit, which takes about as long as some substeps.
   Verdict verdict() const;
-  // What colliders press each particle of a sheet with, Pa, see core/verdict.h.
+  // The scene with the textiles, pins and paths of the last frame, without a start that nothing
+  // depends on any more; the same until they change.
+  std::shared_ptr<const Scene> scene_of_frame() const;
+  // What colliders press each particle of a sheet with, Pa, see core/contact_values.h.
   VectorXd pressures(std::size_t sheet) const;
 
   // Changes the textile of a sheet between frames: positions and velocities stay, the step is

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "core/model/self_weight.h"
 #include "core/motion/stability.h"
 #include "core/simulation_state.h"
 
@@ -47,7 +48,8 @@ void Simulation::State::restart(const SheetStates& states, double old_dt,
 
 void Simulation::State::put_textile(std::size_t sheet, const Textile& textile) {
   scene.sheets[sheet].textile = textile;
-  sheets[sheet].set_definition(scene, capped(sheet));
+  scene_of_frame.reset();
+  sheets[sheet].set_definition(scene, capped(scene, sheet));
 }
 
 std::optional<StepRefusal> Simulation::State::set_textile(std::size_t sheet,
@@ -123,7 +125,7 @@ bool Simulation::State::change_dressing() {
 void Simulation::State::dress(const DressingState& state) {
   const bool was_closed = sheets.front().dressing.ease == 1;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
-    sheets[s].dress(scene, capped(s), state);
+    sheets[s].dress(scene, capped(scene, s), state);
     sheets[s].solver = make_solver(scene, simulated(s), sheets[s].mesh, sheets[s].dynamics);
   }
   if (was_closed != (state.ease == 1)) make_cloth_contact();
@@ -184,6 +186,7 @@ Constraints Simulation::State::constraints() const {
 }
 
 void Simulation::State::adopt(Constraints constraints) {
+  scene_of_frame.reset();
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     scene.sheets[s].pins = std::move(constraints.pins[s]);
     sheets[s].set_pins(scene.sheets[s]);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,6 +34,7 @@ struct UnfinishedFrame {
 
 struct Simulation::State {
   Scene scene;
+  std::shared_ptr<const Scene> scene_of_frame;  // a copy, once it is asked for
   SolverFactory make_solver;
   Plan plan;
   std::vector<MovingSheet> sheets;
@@ -56,7 +58,6 @@ struct Simulation::State {
   LeftOut open_seams() const;
   void release_memory();
   void restore_memory();
-  SheetDefinition capped(std::size_t sheet) const;
   SheetDefinition simulated(std::size_t sheet) const;
   VectorXd planned_inverse_mass(std::size_t sheet) const;
   Plan plan_for(const std::vector<Matrix3Xd>& x) const;

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "core/cloth_contact/cuts.h"
-#include "core/contact/contact.h"
-#include "core/forces/elastic.h"
+#include "core/contact_values.h"
 #include "core/model/strain.h"
 #include "core/model/text.h"
 #include "core/moving_sheet.h"
@@ -14,32 +12,9 @@
 namespace weft {
 namespace {
 
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
 constexpr double kMostStrain99 = 0.1;  // of cloth that fits
 constexpr double kMostSlid = 0.03;     // m
 constexpr double kMostDepth = 1e-4;    // of a particle in a collider, m
-
-// From the nearest collider.
-Distance distance_from_any(const Scene& scene, const MovingBodies& bodies, const Vector3d& x,
-                           double time) {
-  Distance least{kInfinite, Vector3d::UnitY()};
-  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
-    if (const Distance found = distance(scene.colliders[c], x, time, bodies.of(c));
-        found.value < least.value)
-      least = found;
-  return least;
-}
-
-// Of each particle, m^2.
-VectorXd areas_of(const SheetShape& shape, const Matrix3Xd& x) {
-  VectorXd areas = VectorXd::Zero(x.cols());
-  for (const auto& [a, b, c] : triangles_of(shape)) {
-    const Vector3d ab = x.col(b) - x.col(a), ac = x.col(c) - x.col(a);
-    const double third = ab.cross(ac).norm() / 6;
-    for (const int i : {a, b, c}) areas[i] += third;
-  }
-  return areas;
-}
 
 double percentile_99(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -110,22 +85,6 @@ void find_faults(const Scene& scene, Verdict& verdict) {
 }
 
 }  // namespace
-
-VectorXd pressures(const Scene& scene, const MovingBodies& bodies, const SheetDefinition& sheet,
-                   const MovingSheet& moving, const Matrix3Xd& x, double time) {
-  constexpr double kTouching = 0.1;  // of the skin
-  const VectorXd areas = areas_of(sheet.shape, x);
-  Matrix3Xd force = moving.dynamics.gravity * moving.mesh.mass.transpose();
-  add_elastic_forces(moving.mesh, x, Matrix3Xd::Zero(3, x.cols()), force);
-  VectorXd pressure = VectorXd::Zero(x.cols());
-  for (Eigen::Index i = 0; i < x.cols(); ++i) {
-    if (moving.dynamics.inverse_mass[i] == 0 || areas[i] == 0) continue;
-    const auto [value, normal] = distance_from_any(scene, bodies, x.col(i), time);
-    if (value < (1 + kTouching) * moving.skin)
-      pressure[i] = std::max(0.0, -force.col(i).dot(normal)) / areas[i];
-  }
-  return pressure;
-}
 
 Verdict judge(const Scene& scene, const MovingBodies& bodies,
               const std::vector<MovingSheet>& sheets, double time, bool at_rest) {

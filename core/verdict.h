@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/model/mesh.h"
+#include "core/model/scene.h"
 
 namespace weft {
 
@@ -30,12 +30,6 @@ struct Verdict {
   double slid = 0;              // of what was held: farthest down from its start, its mean, m
   std::vector<Fault> faults;    // none: it is good
 };
-
-// What colliders press each particle with, Pa: all that forces and weight push it towards one that
-// it touches, over a third of the area of its triangles. So it is for cloth at rest. bodies: placed
-// for `time`; x: (3 x particles) m, of a sheet in that scene.
-VectorXd pressures(const Scene& scene, const MovingBodies& bodies, const SheetDefinition& sheet,
-                   const MovingSheet& moving, const Matrix3Xd& x, double time);
 
 // The sheets as they are at the end of a frame at `time`, in the order of the scene.
 Verdict judge(const Scene& scene, const MovingBodies& bodies,

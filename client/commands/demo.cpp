@@ -16,6 +16,7 @@
 #include "client/page/page.h"
 #include "client/recording/comparison.h"
 #include "client/recording/recorder.h"
+#include "client/recording/writer.h"
 #include "client/templates/templates.h"
 #include "client/textile_file.h"
 
@@ -198,6 +199,7 @@ void perform(Connection& connection, Run& run, const std::function<void(const Ta
   order.to = run.last_frame;
   order.until_rest = true;
   order.run = true;
+  order.pressure = order.clearance = run.scene.has_dressing();
   const RecordingResult result = record(connection, order, progress);
   if (!result.complete) throw interrupted();
   run.tally = result.tally;
@@ -205,7 +207,9 @@ void perform(Connection& connection, Run& run, const std::function<void(const Ta
   if (run.scene.has_dressing()) {
     v1::GetVerdictRequest ask;
     ask.set_name(session.name());
-    run.verdict = connection.call(&Sessions::GetVerdict, ask).good() ? "good" : "not good";
+    const v1::Verdict verdict = connection.call(&Sessions::GetVerdict, ask);
+    add_verdict(order.path, verdict);
+    run.verdict = verdict.good() ? "good" : "not good";
   }
   export_run(run);
 }

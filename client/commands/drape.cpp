@@ -13,7 +13,9 @@
 #include "client/output/status.h"
 #include "client/output/text.h"
 #include "client/page/page.h"
+#include "client/recording/phases.h"
 #include "client/recording/recorder.h"
+#include "client/recording/writer.h"
 #include "client/scene_file.h"
 #include "client/textile_file.h"
 
@@ -80,28 +82,28 @@ std::optional<GarmentInfo> template_called(const std::string& name) {
 }
 
 // What goes on at a time.
-const char* phase_at(const v1::Dressing& dressing, double time_s) {
-  if (time_s < dressing.close_s()) return "seams close";
-  if (time_s < dressing.close_s() + dressing.settle_s()) return "weight comes in";
-  for (const v1::Hold& hold : dressing.holds())
-    if (time_s < dressing.close_s() + hold.until_s()) return "held up";
-  return "comes to rest";
+std::string phase_at(const std::vector<Phase>& phases, double time_s) {
+  for (const Phase& phase : phases)
+    if (!phase.until_s || time_s < *phase.until_s) return phase.name;
+  return {};
 }
 
 RecordingResult dress(Context& context, const v1::Session& session, const DrapeOptions& options,
                       const std::string& path) {
   const v1::Scene& scene = session.scene();
+  const std::vector<Phase> phases = phases_of(scene);
   RecordingOrder order;
   order.session = session.name();
   order.path = path;
   order.replace = order.run = true;
   order.from = 0;
   order.until_rest = true;
+  order.pressure = order.clearance = !options.page.empty() || !options.recording.empty();
   order.to = static_cast<std::int64_t>(std::ceil(options.seconds / scene.solver().frame_step_s()));
   Status status(context.terminal.err, context.terminal.err_is_watched);
   RecordingResult result = record(context.connection(), order, [&](const Tally& tally) {
     status.show({fmt::format(
-        "{:<16} {:.2f} s  {}", phase_at(scene.dressing(), tally.last_time_s), tally.last_time_s,
+        "{:<16} {:.2f} s  {}", phase_at(phases, tally.last_time_s), tally.last_time_s,
         tally.last_stats.cloth_cut_count() > 0 ? count_of(tally.last_stats.cloth_cut_count(), "cut")
                                                : "")});
   });
@@ -217,6 +219,7 @@ void run_drape(Context& context, const DrapeOptions& options) {
   v1::GetVerdictRequest ask;
   ask.set_name(session.name());
   const v1::Verdict verdict = context.connection().call(&Sessions::GetVerdict, ask);
+  add_verdict(recorded.path(), verdict);
   Json document{{"garment", made.json}, {"verdict", to_json(verdict)}, {"session", session.name()}};
   const std::vector<v1::Warning> start = faults_of_start(session.plan());
   for (const v1::Warning& warning : start) document["start"].push_back(to_json(warning));

@@ -30,11 +30,19 @@ std::string numbers_text(const v1::FrameFormat& format) {
   }
 }
 
+std::string content_text(const v1::FrameFormat& format) {
+  std::string text = "positions";
+  if (format.velocities()) text += ", velocities";
+  if (format.pressure()) text += ", pressure";
+  if (format.clearance()) text += ", clearance";
+  return text + ", " + numbers_text(format);
+}
+
 std::string cuts_text(std::int64_t most) {
   return most == 0 ? "none" : fmt::format("{} in a frame at most", most);
 }
 
-std::string facts_text(const RecordingReader& recording, const Inspection& inspection) {
+std::string facts_text(RecordingReader& recording, const Inspection& inspection) {
   const v1::StreamHeader& header = recording.header();
   const Tally& tally = inspection.tally;
   Facts facts;
@@ -44,9 +52,7 @@ std::string facts_text(const RecordingReader& recording, const Inspection& inspe
       .add("uid", header.uid())
       .add("numerics", header.numerics_id())
       .add("sheets", sheets_text(recording))
-      .add("content",
-           fmt::format("positions{}, {}", header.format().velocities() ? ", velocities" : "",
-                       numbers_text(header.format())))
+      .add("content", content_text(header.format()))
       .add("frame step", seconds_text(header.frame_step_s()))
       .add("frames", tally.frames == 0 ? "none"
                                        : fmt::format("{} ({} to {})", tally.frames,
@@ -58,6 +64,8 @@ std::string facts_text(const RecordingReader& recording, const Inspection& inspe
         .add("largest strain", percent_text(tally.largest_strain))
         .add("repairs", tally.repairs == 0 ? "none" : std::to_string(tally.repairs));
     if (tally.most_cuts) facts.add("cuts of cloth", cuts_text(*tally.most_cuts));
+    if (const auto verdict = recording.verdict())
+      facts.add("verdict", verdict->good() ? "good" : "not good");
     facts.add("kinetic energy", number_text(tally.last_stats.kinetic_energy_j()) + " J at the end")
         .add("potential energy",
              number_text(tally.last_stats.potential_energy_j()) + " J at the end")

@@ -93,6 +93,9 @@ void add_record(CLI::App& app, Context& context) {
   command->add_flag("--run", order.run,
                     "Let the session run, as far as it is recorded (always with --embedded)");
   command->add_flag("--velocities", order.velocities, "Velocities too");
+  command->add_flag("--pressure", order.pressure, "Pressure of colliders on each particle too");
+  command->add_flag("--clearance", order.clearance,
+                    "Distance of each particle from the nearest collider too");
   command
       ->add_option("--encoding", order.encoding,
                    "Numbers in the file [float32]; quantized: within 0.05 mm")

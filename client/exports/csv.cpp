@@ -10,10 +10,14 @@ namespace {
 
 class CsvWriter : public FrameWriter {
  public:
-  CsvWriter(const std::string& path, std::size_t particles) : file_(path) {
+  CsvWriter(const std::string& path, std::size_t particles, const std::vector<std::string>& values)
+      : file_(path) {
     std::string heading = "t";
     for (std::size_t i = 0; i < particles; ++i)
       fmt::format_to(std::back_inserter(heading), ",x{0},y{0},z{0}", i);
+    for (const std::string& name : values)
+      for (std::size_t i = 0; i < particles; ++i)
+        fmt::format_to(std::back_inserter(heading), ",{}{}", name, i);
     file_.write(heading + '\n');
   }
 
@@ -23,6 +27,9 @@ class CsvWriter : public FrameWriter {
     for (std::size_t i = 0; i < x.size(); ++i) {
       fmt::format_to(std::back_inserter(row), ",{:.12f},{:.12f},{:.12f}", x[i], y[i], z[i]);
     }
+    for (const ExportValues& each : frame.values)
+      for (const double value : each.values)
+        fmt::format_to(std::back_inserter(row), ",{:.9g}", value);
     file_.write(row + '\n');
   }
 
@@ -34,8 +41,9 @@ class CsvWriter : public FrameWriter {
 
 }  // namespace
 
-std::unique_ptr<FrameWriter> make_csv_writer(const std::string& path, std::size_t particles) {
-  return std::make_unique<CsvWriter>(path, particles);
+std::unique_ptr<FrameWriter> make_csv_writer(const std::string& path, std::size_t particles,
+                                             const std::vector<std::string>& values) {
+  return std::make_unique<CsvWriter>(path, particles, values);
 }
 
 }  // namespace weft::client

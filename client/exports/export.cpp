@@ -89,6 +89,26 @@ UsdStage stage_of(const RecordingReader& recording, const std::vector<std::int64
           .up_axis = std::abs(gravity.z()) > std::abs(gravity.y()) ? 'Z' : 'Y'};
 }
 
+std::vector<std::string> value_names(const RecordingReader& recording) {
+  std::vector<std::string> names;
+  if (recording.header().format().pressure()) names.emplace_back("pressure");
+  if (recording.header().format().clearance()) names.emplace_back("clearance");
+  return names;
+}
+
+std::vector<ExportValues> values_of(const v1::Frame& frame, const RecordingReader& recording,
+                                    const Part& part) {
+  std::vector<ExportValues> values;
+  const auto add = [&](const char* name, const std::vector<double>& all) {
+    const auto begin = all.begin() + static_cast<std::ptrdiff_t>(part.first);
+    values.push_back({name, {begin, begin + static_cast<std::ptrdiff_t>(part.count)}});
+  };
+  const v1::FrameFormat& format = recording.header().format();
+  if (format.pressure()) add("pressure", read_pressures(frame, recording.header()));
+  if (format.clearance()) add("clearance", read_clearances(frame, recording.header()));
+  return values;
+}
+
 std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& part,
                                          const RecordingReader& recording,
                                          const std::vector<std::int64_t>& numbers) {
@@ -100,7 +120,7 @@ std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& p
     case ExportFormat::kMdd:
       return make_mdd_writer(order.path, part.count, numbers.size());
     case ExportFormat::kGltf:
-      return make_gltf_writer(order.path, part.sheets, numbers.size());
+      return make_gltf_writer(order.path, part.sheets, numbers.size(), value_names(recording));
     case ExportFormat::kVtk:
       return make_vtk_writer(order.path, part.sheets);
     case ExportFormat::kUsda:
@@ -110,7 +130,7 @@ std::unique_ptr<FrameWriter> make_writer(const ExportOrder& order, const Part& p
           order.path, part.sheets, numbers.size(),
           1 / (recording.header().frame_step_s() * static_cast<double>(order.every)));
     case ExportFormat::kCsv:
-      return make_csv_writer(order.path, part.count);
+      return make_csv_writer(order.path, part.count, value_names(recording));
   }
   throw std::logic_error("no such format");
 }
@@ -135,7 +155,8 @@ ExportResult export_recording(RecordingReader& recording, const ExportOrder& ord
     writer->add(
         {.number = frame.number(),
          .time_s = frame.time_s(),
-         .points = read_points(frame.positions_m(), recording.header(), part.first, part.count)});
+         .points = read_points(frame.positions_m(), recording.header(), part.first, part.count),
+         .values = values_of(frame, recording, part)});
     ++result.frames;
     progress(result);
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -125,8 +126,10 @@ Vectors at_vertices(const Vectors& of_particles, const std::vector<std::uint32_t
 // known but for the digits of the bounds.
 class GltfWriter : public FrameWriter {
  public:
-  GltfWriter(const std::string& path, Drawing drawing, std::size_t frames)
+  GltfWriter(const std::string& path, Drawing drawing, std::size_t frames,
+             const std::vector<std::string>& values)
       : file_(path), drawing_(std::move(drawing)), bounds_(frames) {
+    if (frames == 1) values_ = values;
     json_room_ = json_text().size() + frames * 6 * kLongestNumber;
     json_room_ += (4 - json_room_ % 4) % 4;
     file_.write(std::string(20 + json_room_ + 8, ' '));
@@ -154,6 +157,13 @@ class GltfWriter : public FrameWriter {
     times_.push_back(time);
     file_.write(bytes_of(positions));
     file_.write(bytes_of(normals));
+    if (values_.empty()) return;
+    for (const ExportValues& each : frame.values) {
+      std::vector<float> values;
+      for (const std::uint32_t i : drawing_.particles)
+        values.push_back(static_cast<float>(each.values[i]));
+      file_.write(bytes_of(values));
+    }
   }
 
   void finish() override {
@@ -181,7 +191,7 @@ class GltfWriter : public FrameWriter {
   static void check(const Drawing& drawing, std::size_t frames) {
     const std::size_t particles = drawing.particles.size();
     const std::size_t bytes =
-        4 * drawing.index_count() + (12 + 24 * frames) * particles + 4 * frames * frames;
+        4 * drawing.index_count() + (20 + 24 * frames) * particles + 4 * frames * frames;
     if (frames > kMostFrames || bytes > std::numeric_limits<std::uint32_t>::max() / 2) {
       throw usage_problem(fmt::format(
           "{} frames of {} particles are too much for glTF, which takes {} frames and 2 GiB: "
@@ -195,7 +205,7 @@ class GltfWriter : public FrameWriter {
     const std::size_t frames = bounds_.size();
     const std::size_t vertices = drawing_.particles.size();
     return 4 * drawing_.index_count() + (drawing_.has_flat_shape() ? 12 * vertices : 0) +
-           24 * vertices * frames + (frames > 1 ? 4 * frames * frames : 0);
+           (24 * frames + 4 * values_.size()) * vertices + (frames > 1 ? 4 * frames * frames : 0);
   }
 
   // One view of the binary chunk for every array, in the order in which they are written.
@@ -240,6 +250,8 @@ class GltfWriter : public FrameWriter {
     }
     Json attributes = shapes[0];
     attributes.update(flat_shape);
+    for (const std::string& name : values_)
+      attributes[attribute_of(name)] = arrays.add(kFloat, "SCALAR", 1, vertices, kVertices);
     // a material for each panel: what tools that join primitives tell them apart by
     Json primitives = Json::array(), materials = Json::array();
     for (std::size_t i = 0; i < indices.size(); ++i) {
@@ -276,12 +288,21 @@ class GltfWriter : public FrameWriter {
     return json.dump();
   }
 
+  // Of an application: "pressure" -> "_PRESSURE".
+  static std::string attribute_of(const std::string& name) {
+    std::string attribute = "_";
+    for (const char letter : name)
+      attribute += static_cast<char>(std::toupper(static_cast<unsigned char>(letter)));
+    return attribute;
+  }
+
   OutputFile file_;
   Drawing drawing_;
-  std::vector<Bounds> bounds_;  // of every frame's positions
-  std::vector<float> times_;    // from the first frame on, s
-  double start_ = 0;            // s
-  Vectors base_positions_;      // of the first frame
+  std::vector<std::string> values_;  // names of those that are written
+  std::vector<Bounds> bounds_;       // of every frame's positions
+  std::vector<float> times_;         // from the first frame on, s
+  double start_ = 0;                 // s
+  Vectors base_positions_;           // of the first frame
   Vectors base_normals_;
   std::size_t json_room_ = 0;
 };
@@ -290,10 +311,11 @@ class GltfWriter : public FrameWriter {
 
 std::unique_ptr<FrameWriter> make_gltf_writer(const std::string& path,
                                               const std::vector<SheetMesh>& sheets,
-                                              std::size_t frames) {
+                                              std::size_t frames,
+                                              const std::vector<std::string>& values) {
   Drawing drawing(sheets);
   GltfWriter::check(drawing, frames);
-  return std::make_unique<GltfWriter>(path, std::move(drawing), frames);
+  return std::make_unique<GltfWriter>(path, std::move(drawing), frames, values);
 }
 
 }  // namespace weft::client

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <string_view>
 
 #include "client/exports/frame_writer.h"
@@ -41,7 +42,7 @@ class NpzWriter : public FrameWriter {
  public:
   NpzWriter(const std::string& path, const std::vector<SheetMesh>& sheets, std::size_t frames,
             double frames_per_second)
-      : file_(path) {
+      : file_(path), frames_(frames) {
     std::vector<std::int32_t> faces, faces_uv, panel;
     std::vector<float> corners;
     std::vector<std::string> names;
@@ -78,11 +79,16 @@ class NpzWriter : public FrameWriter {
                     {static_cast<float>(x[i]), static_cast<float>(y[i]), static_cast<float>(z[i])});
     }
     write(bytes_of(values));
+    for (const auto& [name, of_particles] : frame.values) {
+      std::vector<float>& all = values_[name];
+      all.insert(all.end(), of_particles.begin(), of_particles.end());
+    }
   }
 
-  // the checksum of the frames is known only now
   void finish() override {
     end_file();
+    for (const auto& [name, all] : values_)
+      add_array(name, "<f4", {frames_, all.size() / frames_}, bytes_of(all));
     const std::size_t end = written_;
     for (const Entry& entry : entries_) write(directory_entry(entry));
     std::string tail("PK\x05\x06\0\0\0\0", 8);
@@ -91,13 +97,11 @@ class NpzWriter : public FrameWriter {
     put(tail, 4, end);
     put(tail, 2, 0);
     file_.write(tail);
-    file_.seek(static_cast<std::streamoff>(entries_.back().place));
-    file_.write(local_entry(entries_.back()));
     file_.close();
   }
 
   static void check(std::size_t particles, std::size_t frames) {
-    if (12 * particles * frames <= std::numeric_limits<std::uint32_t>::max() / 2) return;
+    if (20 * particles * frames <= std::numeric_limits<std::uint32_t>::max() / 2) return;
     throw usage_problem(
         fmt::format("{} frames of {} particles are too much for npz, which takes 2 GiB: choose "
                     "with --frames or --every",
@@ -150,17 +154,19 @@ class NpzWriter : public FrameWriter {
     checksum_ = 0;
     write(header);
   }
-  void end_file() { entries_.back().checksum = checksum_; }
+  // The checksum is known only now.
+  void end_file() {
+    entries_.back().checksum = checksum_;
+    file_.seek(static_cast<std::streamoff>(entries_.back().place));
+    file_.write(local_entry(entries_.back()));
+    file_.seek(static_cast<std::streamoff>(written_));
+  }
 
   void add_array(const std::string& name, std::string_view type,
                  const std::vector<std::size_t>& shape, std::string_view bytes) {
     begin_file(name, type, shape, bytes.size());
     write(bytes);
     end_file();
-    const auto place = static_cast<std::streamoff>(entries_.back().place);
-    file_.seek(place);
-    file_.write(local_entry(entries_.back()));
-    file_.seek(static_cast<std::streamoff>(written_));
   }
 
   // Letters of 32 bits, as many for each name.
@@ -175,6 +181,8 @@ class NpzWriter : public FrameWriter {
   }
 
   OutputFile file_;
+  std::size_t frames_;
+  std::map<std::string, std::vector<float>> values_;  // of all frames, which come last
   std::vector<Entry> entries_;
   std::size_t written_ = 0;
   std::uint32_t checksum_ = 0;  // of the file that is written

@@ -64,7 +64,7 @@ class VtkWriter : public FrameWriter {
   void add(const ExportFrame& frame) override {
     const std::string name = fmt::format("frame_{:06}.vtp", frame.number);
     OutputFile file((directory_ / name).string());
-    file.write(mesh_text(frame.points));
+    file.write(mesh_text(frame));
     file.close();
     collection_.write(fmt::format("<DataSet timestep=\"{:.12g}\" part=\"0\" file=\"{}/{}\"/>\n",
                                   frame.time_s, directory_.filename().string(), name));
@@ -95,7 +95,8 @@ class VtkWriter : public FrameWriter {
       if (!is_grid(sheet.layout)) panels_.insert(panels_.end(), panel.count, panel_++);
   }
 
-  std::string mesh_text(const Points& points) const {
+  std::string mesh_text(const ExportFrame& frame) const {
+    const Points& points = frame.points;
     std::vector<double> values;
     values.reserve(3 * points.x.size());
     for (std::size_t i = 0; i < points.x.size(); ++i)
@@ -107,12 +108,21 @@ class VtkWriter : public FrameWriter {
         "header_type=\"UInt64\">\n"
         "<PolyData>\n<Piece NumberOfPoints=\"{}\" NumberOfPolys=\"{}\">\n",
         points.x.size(), ends_.size());
-    text += "<Points>\n" + arrays.add("Float64", "NumberOfComponents=\"3\"", bytes_of(values)) +
+    text += point_data(frame, arrays) + "<Points>\n" +
+            arrays.add("Float64", "NumberOfComponents=\"3\"", bytes_of(values)) +
             "</Points>\n<Polys>\n" +
             arrays.add("Int32", "Name=\"connectivity\"", bytes_of(corners_)) +
             arrays.add("Int32", "Name=\"offsets\"", bytes_of(ends_)) + "</Polys>\n" +
             cell_data(arrays) + "</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">_";
     return text + arrays.bytes() + "</AppendedData>\n</VTKFile>\n";
+  }
+
+  static std::string point_data(const ExportFrame& frame, Appended& arrays) {
+    if (frame.values.empty()) return {};
+    std::string text = "<PointData>\n";
+    for (const auto& [name, values] : frame.values)
+      text += arrays.add("Float64", fmt::format("Name=\"{}\"", name), bytes_of(values));
+    return text + "</PointData>\n";
   }
 
   // Where there are panels; the last corner of a triangle stands twice.

@@ -11,8 +11,8 @@ function bytesOf(base64) {
 const particlesOf = ({rows, columns, particle_count}) => rows * columns || particle_count;
 
 // What a sheet has: its triangles, their two sides from the first corner along warp and weft where the sheet is
-// flat, panels as runs of triangles, lines to be drawn as pairs of particles, and how far it reaches. Both kinds
-// below have these.
+// flat, the corners of each in the flat shape, and where these are; panels as runs of triangles, lines to be drawn as
+// pairs of particles, and how far it reaches. Both kinds below have these.
 
 // Two triangles of each cell; the lines are its rows and columns.
 class Lattice {
@@ -34,6 +34,9 @@ class Lattice {
         this.sides.push(0, h, h, 0, 0, -h, -h, 0);
       }
     }
+    this.corners = this.triangles.map((i) => i - first_particle);
+    this.flat = Float32Array.from({length: 2 * rows * columns}, (_, k) =>
+      (k % 2 ? -h * Math.floor((k >> 1) / columns) : h * ((k >> 1) % columns)));
     this.panels = [{name, triangle_count: this.triangles.length / 3}];
     this.reach = h * Math.max(rows, columns);
   }
@@ -81,6 +84,8 @@ class Mesh {
     const flat = new Float32Array(bytesOf(mesh.flat_m).buffer);
     const [u, v] = [flat.subarray(0, flat.length / 2), flat.subarray(flat.length / 2)];
     this.triangles = own.map((i) => first_particle + i);
+    this.corners = corners;
+    this.flat = Float32Array.from(flat, (_, k) => (k % 2 ? v : u)[k >> 1]);
     this.panels = mesh.panels?.length ? mesh.panels : [{name, triangle_count: own.length / 3}];
     this.sides = new Float32Array(4 / 3 * own.length);
     this.reach = 0;
@@ -119,12 +124,14 @@ class Cloth {
     this.pins = sheets.flatMap(({first_particle, pinned}) => pinned.map((i) => first_particle + i));
     const count = this.parts.reduce((sum, {triangles}) => sum + triangles.length / 3, 0);
     this.triangles = new Uint32Array(3 * count);
+    this.corners = new Uint32Array(3 * count);
+    this.flat = [];
     this.inverse = new Float32Array(4 * count);  // of the sides
     this.area = new Float32Array(count);
     this.areas = new Float32Array(particles);  // of the triangles around each
     this.panels = [];
     let t = 0;
-    for (const {sheet, triangles, sides, panels} of this.parts) {
+    for (const {sheet, triangles, corners, flat, sides, panels} of this.parts) {
       let first = t;
       for (const panel of panels) {
         const name = sheets.length > 1 && panel.name !== sheet.name ? `${sheet.name} ${panel.name}` : panel.name;
@@ -132,6 +139,8 @@ class Cloth {
         first += panel.triangle_count;
       }
       this.triangles.set(triangles, 3 * t);
+      this.corners.set(corners.map((corner) => this.flat.length / 2 + corner), 3 * t);
+      for (const place of flat) this.flat.push(place);
       for (let k = 0; k < sides.length; k += 4, ++t) {
         const [a, b, c, d] = sides.slice(k, k + 4);
         const twice = a * d - b * c;
@@ -140,6 +149,10 @@ class Cloth {
         for (let corner = 3 * t; corner < 3 * t + 3; ++corner) this.areas[this.triangles[corner]] += this.area[t];
       }
     }
+  }
+
+  panelOf(triangle) {
+    return this.panels.find(({first, triangle_count}) => triangle < first + triangle_count);
   }
 
   // How three values of each particle change over triangle t, along the warp and then along the weft, 1/m.

@@ -1,8 +1,8 @@
 // What is simulated as a scene of three.js. Lengths in m, times in s.
 'use strict';
 
-const kRamp = ['#3288bd', '#66c2a5', '#abdda4', '#e6f598', '#fee08b', '#fdae61', '#f46d43', '#d53e4f',
-  '#9e0142'];  // ColorBrewer's Spectral
+const kRamp = ['#fcf7b9', '#fec98d', '#fe9d6c', '#f7705c', '#de4968', '#b73779', '#8c2981', '#641a80',
+  '#51127c'];  // matplotlib's magma, its pale end for little
 const kBalance = ['#3b4cc0', '#6f92f3', '#aac7fd', '#dddddd', '#f7b89c', '#e7745b', '#b40426'];  // Moreland's cool to warm
 const kPanels = ['#66c2a5', '#fc8d62', '#8da0cb', '#e78ac3', '#a6d854', '#ffd92f', '#e5c494', '#b3b3b3'];  // ColorBrewer's Set2
 
@@ -139,8 +139,10 @@ function colliderMesh(collider, material, centre, reach) {
   return group;
 }
 
-// What colours say of a particle. Around 0 where `balanced`, else from 0 on.
+// What colours say of a particle. Around 0 where `balanced`, else from 0 on, the other way round where `reversed`.
+// Where it is `recorded` the source may not have it, and the scale ends at a round number that few go beyond.
 const percent = (value) => `${(100 * value).toPrecision(3)} %`;
+const inUnits = (value, unit) => `${Number(value.toPrecision(3))} ${unit}`;
 const kQuantities = {
   strain: {
     title: 'Strain, largest at a particle',
@@ -159,12 +161,38 @@ const kQuantities = {
     text: (value) => `${value.toPrecision(3)} m/s`,
     write: (source, out, positions, frame) => source.writeSpeeds(out, frame),
   },
+  pressure: {
+    title: 'Pressure of bodies',
+    text: (value) => `${Number((value / 1000).toFixed(3))} kPa`,
+    recorded: true,
+    write: (source, out, positions, frame) => source.writeValues('pressure', out, frame),
+  },
+  clearance: {
+    title: 'Clearance from bodies',
+    text: (value) => `${Number((value * 1000).toFixed(1))} mm`,
+    recorded: true,
+    reversed: true,
+    write: (source, out, positions, frame) => source.writeValues('clearance', out, frame),
+  },
   bending: {
     title: 'Bending energy for each area',
     text: (value) => `${digits(value)} J/m²`,
     write: ({cloth}, out, positions) => cloth.writeBending(out, positions),
   },
 };
+const rampOf = ({balanced, reversed}) => (balanced ? kBalance : reversed ? [...kRamp].reverse() : kRamp);
+
+function roundUp(value) {
+  if (!(value > 0)) return 0;
+  const power = 10 ** Math.floor(Math.log10(value));
+  return power * [1, 1.5, 2, 3, 4, 5, 6, 8, 10].find((digit) => digit * power >= 0.999 * value);
+}
+
+// The round number that a hundredth of the positive values go beyond.
+function roundMost(values) {
+  const sorted = values.filter((value) => value > 0).sort();
+  return roundUp(sorted[Math.floor(0.99 * (sorted.length - 1))]);
+}
 const largestOf = (values, atLeast = 0) => values.reduce((most, value) => Math.max(most, Math.abs(value)), atLeast);
 
 // A recording, or a session, in a scene of its own. It says what there is ({name, particles, cloth, colliders,
@@ -180,6 +208,7 @@ class Pane {
     this.addBodies(centre, radius);
     this.addGrid(box, up);
     this.values = new Float32Array(source.particles);
+    this.hidden = new Set();  // names of sheets
     this.paint();
   }
 
@@ -216,7 +245,7 @@ class Pane {
       made.setIndex(new THREE.BufferAttribute(Uint32Array.from(index), 1));
       return made;
     };
-    const surface = geometry(cloth.triangles);
+    const surface = this.surface = geometry(cloth.triangles);
     cloth.panels.forEach(({first, triangle_count}, k) => surface.addGroup(3 * first, 3 * triangle_count, k));
     const options = {polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1};
     const material = (side, more) =>
@@ -242,9 +271,74 @@ class Pane {
     this.held = new THREE.Points(geometry([0]), dots(16));
     this.held.material.depthTest = false;  // seen through folds
     this.held.visible = false;
-    this.cloth.add(this.lines, this.pins, this.held);
+    this.mark = markOf();
+    this.cloth.add(this.lines, this.pins, this.held, this.mark);
     this.cloth.traverse((child) => { child.frustumCulled = false; });  // its bounds change with every frame
     this.scene.add(this.cloth);
+  }
+
+  // Without the sheets of these names.
+  hideSheets(hidden) {
+    this.hidden = hidden;
+    const {cloth} = this.source;
+    const parts = cloth.parts.filter(({sheet}) => !hidden.has(sheet.name));
+    const panels = cloth.panels.filter(({sheet}) => !hidden.has(sheet.name));
+    this.shown = panels.flatMap(({first, triangle_count}) => Array.from({length: triangle_count}, (_, k) => first + k));
+    for (const [geometry, index] of [[this.surface, cloth.triangles], [this.flat?.surface, this.flat?.index]]) {
+      if (!geometry) continue;
+      geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(
+        {length: 3 * this.shown.length}, (_, i) => index[3 * this.shown[Math.floor(i / 3)] + i % 3]), 1));
+      geometry.clearGroups();
+      let start = 0;
+      for (const panel of panels) {
+        geometry.addGroup(start, 3 * panel.triangle_count, cloth.panels.indexOf(panel));
+        start += 3 * panel.triangle_count;
+      }
+    }
+    const lines = (kind) => parts.flatMap((part) => (part instanceof kind ? part.lines : []));
+    [Lattice, Mesh].forEach((kind, k) => this.lines.children[k].geometry.setIndex(
+      new THREE.BufferAttribute(Uint32Array.from(lines(kind)), 1)));
+    this.pins.visible = hidden.size === 0;
+  }
+
+  get pattern() {
+    if (!this.flat) {
+      this.flat = new Pattern(this.source.cloth);
+      this.paint();
+      this.hideSheets(this.hidden);
+    }
+    return this.flat;
+  }
+
+  // The place on the cloth where a ray meets one of these meshes first: the triangle, and weights of its corners.
+  placeAt(ray, meshes, others = []) {
+    meshes[0].geometry.computeBoundingSphere();
+    const [hit] = ray.intersectObjects([...meshes, ...others], true);
+    if (!meshes.includes(hit?.object)) return undefined;
+    const {a, b, c} = hit.face;
+    const positions = meshes[0].geometry.getAttribute('position');
+    const at = (i) => new THREE.Vector3().fromBufferAttribute(positions, i);
+    const point = hit.object.worldToLocal(hit.point.clone());
+    const weights = new THREE.Triangle(at(a), at(b), at(c)).getBarycoord(point, new THREE.Vector3()).toArray();
+    return {triangle: this.shown?.[hit.faceIndex] ?? hit.faceIndex, weights};
+  }
+
+  // Marks a place in space and on the pattern; none where it is not given.
+  markPlace(place) {
+    this.mark.visible = false;
+    if (this.flat) this.flat.mark.visible = false;
+    if (!place || this.hidden.has(this.source.cloth.panelOf(place.triangle).sheet.name)) return;
+    const corners = [0, 1, 2].map((k) => 3 * place.triangle + k);
+    moveMark(this.mark, this.position.array, corners.map((i) => this.source.cloth.triangles[i]), place.weights);
+    if (this.flat) {
+      moveMark(this.flat.mark, this.flat.surface.getAttribute('position').array,
+        corners.map((i) => this.flat.index[i]), place.weights);
+    }
+  }
+
+  // What the colours say there.
+  valueAt({triangle, weights}) {
+    return weights.reduce((sum, weight, k) => sum + weight * this.values[this.source.cloth.triangles[3 * triangle + k]], 0);
   }
 
   // Marks the particle that a hand holds, if any.
@@ -299,7 +393,9 @@ class Pane {
     this.bodyMaterial.color.copy(linear(style('--body')));
     this.grid.material.color.copy(linear(style('--grid')));
     for (const {material} of this.lines.children) material.color.copy(linear(style('--lines')));
-    for (const {material} of [this.pins, this.held]) material.color.copy(linear(style('--accent')));
+    this.flat?.lines.material.color.copy(linear(style('--lines')));
+    const points = [this.pins, this.held, this.mark, this.flat?.mark];
+    for (const each of points) each?.material.color.copy(linear(style('--accent')));
   }
 
   // Goes to time t; between frames where `between`, else at the frame before.
@@ -328,19 +424,25 @@ class Pane {
 
   colourBy(quantity, most) {
     const known = kQuantities[quantity];
-    this.faces.forEach(({plain, coloured, panels}, k) => {
-      this.cloth.children[k].material = known ? coloured : quantity ? panels : plain;
-    });
+    const materialOf = ({plain, coloured, panels}) => (known ? coloured : quantity ? panels : plain);
+    this.faces.forEach((face, k) => { this.cloth.children[k].material = materialOf(face); });
+    if (this.flat) {
+      this.flat.mesh.material = materialOf(this.flat);
+      this.flat.plain.color.copy(this.faces[0].plain.color);
+      this.flat.panels.forEach(({color}, k) => color.copy(this.faces[0].panels[k].color));
+    }
     if (!known) return;
     const out = this.colour.array;
     const [steps, middle] = known.balanced ? [kBalanceSteps, 127.5] : [kRampSteps, 0];
     for (let i = 0; i < this.values.length; ++i) {
       const share = most > 0 ? this.values[i] / most : 0;
-      const step = 3 * Math.min(255, Math.round(middle + (255 - middle) * share));
+      const place = Math.round(middle + (255 - middle) * (known.reversed ? 1 - share : share));
+      const step = 3 * Math.min(255, Math.max(0, place));
       out[3 * i] = steps[step];
       out[3 * i + 1] = steps[step + 1];
       out[3 * i + 2] = steps[step + 2];
     }
     this.colour.needsUpdate = true;
+    this.flat?.take(out);
   }
 }

@@ -48,7 +48,6 @@ const kCurrent = [
 class Live extends Stage {
   constructor() {
     super();
-    this.ray = new THREE.Raycaster();
     this.textile = new TextilePanel((change) => this.updateTextile(change));
     this.cells = kCurrent.map(([label]) => {
       const value = cell('td', '');
@@ -71,23 +70,35 @@ class Live extends Stage {
     this.begun = undefined;
     message('Waiting for the first frame …');
     while (turn === this.turn) {
-      const stream = new Conversation('weft.v1.FrameService/ViewFrames');
+      const stream = this.stream = new Conversation('weft.v1.FrameService/ViewFrames');
+      const {asked} = this;
+      const wanted = () => turn === this.turn && asked === this.asked;
       try {
-        await this.watch(name, stream, () => turn === this.turn);
+        await this.watch(name, stream, wanted);
       } catch (error) {
-        if (turn === this.turn) trouble('view', error.message);
+        if (wanted()) trouble('view', error.message);
       } finally {
         stream.close();
       }
-      if (turn === this.turn) await pause(1);
+      if (wanted()) await pause(1);
     }
+  }
+
+  // What frames have to have for the colours, beside positions.
+  get asked() { return kQuantities[this.quantity]?.recorded ? this.quantity : undefined; }
+
+  colourChosen() {
+    const {asked} = this;
+    super.colourChosen();
+    if (asked !== this.asked) this.stream?.close();
   }
 
   // A credit for each frame, granted when the one before was drawn: a browser that is slow, or hidden, sees fewer.
   async watch(name, stream, wanted) {
     const shown = await session('GetSession', {name});
     const topology = shown.scene.sheets.some(({grid}) => !grid);
-    const {header} = await stream.ask({session: name, uid: shown.uid, format: {stats: true, topology}, credits: 1});
+    const format = {stats: true, topology, ...(this.asked && {[this.asked]: true})};
+    const {header} = await stream.ask({session: name, uid: shown.uid, format, credits: 1});
     this.setState(stateOf(shown));
     const sight = new Sight(shown, header);
     for (let request = ''; wanted();) {
@@ -119,7 +130,11 @@ class Live extends Stage {
       message('');
     }
     this.textile.show(sight.session.scene.sheets);
-    for (const id of ['textile', 'now-shown']) $(id).hidden = false;
+    for (const id of ['textile', 'judged', 'now-shown']) $(id).hidden = false;
+    if (!again) {
+      $('verdicts').replaceChildren();
+      this.judgedRest = undefined;
+    }
     for (const id of ['play', 'step', 'record']) $(id).disabled = false;
     document.body.dataset.state = 'ready';
   }
@@ -135,15 +150,28 @@ class Live extends Stage {
     this.showName();
   }
 
-  showName() {
+  showName(phase = this.begun && this.sight?.phase) {
     const label = $('names').lastElementChild?.lastElementChild;
-    if (label) label.textContent = this.state;
+    if (label) label.textContent = phase ? `${this.state}, ${phase}` : this.state;
   }
 
   showFrame(frame) {
     kCurrent.forEach(([, text], k) => { this.cells[k].textContent = text(frame).replaceAll(' ', '\u00a0'); });
+    const {phase} = this.sight;
     $('clock').textContent = `frame ${frame.number}, ${frame.time_s.toFixed(3)} s`;
-    this.showName();
+    this.showName(phase);
+    // what has come to rest is judged once
+    const {at_rest} = frame.stats;
+    if (at_rest && !this.judgedRest && phase) this.judge();
+    this.judgedRest = at_rest;
+  }
+
+  judge() {
+    return attempt(async () => {
+      const {name, sight} = this;
+      const verdict = await session('GetVerdict', {name});
+      if (name === this.name) showVerdicts($('verdicts'), [{name: sight.name, verdict}], `Frame ${verdict.frame}`);
+    });
   }
 
   // ---- what is done
@@ -192,24 +220,13 @@ class Live extends Stage {
 
   // ---- the hand
 
-  aim({clientX, clientY}) {
-    const {left, top, width, height} = $('view').getBoundingClientRect();
-    const place = new THREE.Vector2(2 * (clientX - left) / width - 1, 1 - 2 * (clientY - top) / height);
-    this.ray.setFromCamera(place, this.camera);
-  }
-
-  // The particle under the pointer, unless a body is before it.
+  // The particle under the pointer, unless a body is before it; on the pattern too.
   pick(event) {
-    const [pane] = this.panes;
-    const sides = pane.cloth.children.slice(0, 2);
-    sides[0].geometry.computeBoundingSphere();
-    this.aim(event);
-    const [hit] = this.ray.intersectObjects([...sides, ...pane.bodies.map(({mesh}) => mesh)], true);
-    if (!sides.includes(hit?.object)) return undefined;
-    const {a, b, c} = hit.face;
-    const at = (i) => new THREE.Vector3().fromBufferAttribute(pane.position, i);
-    const [nearest] = [a, b, c].sort((i, j) => at(i).distanceTo(hit.point) - at(j).distanceTo(hit.point));
-    return {particle: nearest, at: at(nearest)};
+    const found = this.find(event);
+    if (!found) return undefined;
+    const {pane, place: {triangle, weights}} = found;
+    const particle = pane.source.cloth.triangles[3 * triangle + weights.indexOf(Math.max(...weights))];
+    return {particle, at: new THREE.Vector3().fromBufferAttribute(pane.position, particle)};
   }
 
   grab(event) {
@@ -218,6 +235,7 @@ class Live extends Stage {
     const picked = this.pick(event);
     if (!picked) return;
     this.controls.enabled = false;  // it would turn the view
+    this.place = undefined;
     $('view').setPointerCapture(event.pointerId);
     $('view').classList.add('holding');
     const toward = this.camera.getWorldDirection(new THREE.Vector3());
@@ -233,8 +251,7 @@ class Live extends Stage {
   }
 
   drag(event) {
-    if (!this.hand) return;
-    this.aim(event);
+    if (!this.hand || this.aim(event)?.onPattern !== false) return;
     const target = this.ray.ray.intersectPlane(this.plane, new THREE.Vector3());
     if (target) this.hand.lead(target);
   }
@@ -320,6 +337,7 @@ function listen(live) {
   $('step').addEventListener('click', () => live.step(1));
   $('record').addEventListener('click', record);
   $('hand').addEventListener('click', () => live.toggleHand());
+  $('judge').addEventListener('click', () => live.judge());
   $('speed').addEventListener('change', () => { if (live.isRunning) live.run(); });
   $('view').addEventListener('pointerdown', (event) => live.grab(event));
   $('view').addEventListener('pointermove', (event) => live.drag(event));

@@ -186,6 +186,11 @@ std::vector<Guess> guesses_of(const std::vector<Triangle>& triangles, const Poin
   return Walk(triangles, points).run();
 }
 
+unsigned char Levels::of(double value) const {
+  const double share = high > low ? std::clamp((value - low) / (high - low), 0.0, 1.0) : 0;
+  return static_cast<unsigned char>(std::lround(most * std::sqrt(share)));
+}
+
 PackedFrames::PackedFrames(Deflated::Sink sink, const std::vector<Guess>& guesses,
                            const std::array<double, 3>& origin_m, double quantum_m)
     : guesses_(guesses), origin_(origin_m), quantum_(quantum_m), deflated_(std::move(sink)) {

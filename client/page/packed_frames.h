@@ -47,6 +47,14 @@ struct Guess {
 // Of every particle once, from particles before it in this order. Triangles may be none.
 std::vector<Guess> guesses_of(const std::vector<Triangle>& triangles, const Points& points);
 
+// A value that was recorded of each particle, in levels: level q of `most` stands for
+// low + (high - low) (q / most)^2.
+struct Levels {
+  double low = 0, high = 0;
+  int most = 255;
+  unsigned char of(double value) const;
+};
+
 // Writes frames the way a page holds them. Coordinates are whole numbers of `quantum` from
 // `origin`, rounded; of each its move is kept, the difference to the frame before (of the first: to
 // 0), less what the guess makes of the moves of others. First the guesses come: of each the

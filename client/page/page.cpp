@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <string_view>
 
 #include "client/assets.h"
@@ -16,6 +17,7 @@
 #include "client/page/packed_frames.h"
 #include "client/problem.h"
 #include "client/recording/cloth.h"
+#include "client/recording/phases.h"
 #include "client/recording/points.h"
 #include "client/recording/reader.h"
 #include "client/recording/tally.h"
@@ -39,9 +41,45 @@ constexpr double kLeastStepsOfSpacing = 128;        // where the page would be t
 constexpr double kMostSteps = 1 << 30;              // from the origin
 constexpr std::int64_t kMostNumbers = 100'000'000;  // 400 MB in the browser
 
+// What else was recorded of each particle.
+struct Quantity {
+  std::string name;
+  std::vector<double> (*read)(const v1::Frame&, const v1::StreamHeader&);
+};
+
+std::vector<Quantity> quantities_of(const v1::FrameFormat& format) {
+  std::vector<Quantity> quantities;
+  if (format.pressure()) quantities.push_back({"pressure", read_pressures});
+  if (format.clearance()) quantities.push_back({"clearance", read_clearances});
+  return quantities;
+}
+
+// Of a quantity over the frames of a garment that is put on, or of all, without what few have.
+struct Extent {
+  Levels levels{.low = 0, .high = 0};
+  double scale = 0;  // what colours end at
+};
+
+// Takes what a frame has in.
+void extend(Extent& extent, std::vector<double> values, const std::string& path) {
+  for (const double value : values)
+    if (!std::isfinite(value)) throw damaged(path, "a value of a particle is not finite");
+  const auto beyond = [&](double share) {
+    const auto at = values.begin() +
+                    static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+  };
+  extent.levels.low = std::min(extent.levels.low, beyond(0.001));
+  extent.levels.high = std::max(extent.levels.high, beyond(0.999));
+  std::erase_if(values, [](double value) { return value <= 0; });
+  if (!values.empty()) extent.scale = std::max(extent.scale, beyond(0.99));
+}
+
 // What the page needs to know of a recording before it holds the frames.
 struct Summary {
   Tally tally;
+  std::vector<Extent> extents;          // of the quantities
   std::array<double, 3> low{}, high{};  // of all positions, m
   std::vector<double> times_s;
   std::vector<v1::FrameStats> stats;
@@ -77,6 +115,12 @@ Summary summary_of(RecordingReader& recording, const FrameRange& range) {
   Summary found;
   found.low.fill(std::numeric_limits<double>::infinity());
   found.high.fill(-std::numeric_limits<double>::infinity());
+  const v1::StreamHeader& header = recording.header();
+  const std::vector<Quantity> quantities = quantities_of(header.format());
+  found.extents.resize(quantities.size());
+  double dressed_s = 0;
+  for (const Phase& phase : phases_of(recording.scene()))
+    dressed_s = phase.until_s.value_or(dressed_s);
   for (auto number = range.first; number <= range.last; ++number) {
     const v1::Frame frame = recording.read(number);
     const Points points = points_of(recording, frame);
@@ -91,6 +135,9 @@ Summary summary_of(RecordingReader& recording, const FrameRange& range) {
         found.high[axis] = std::max(found.high[axis], value);
       }
     }
+    for (std::size_t q = 0; q < quantities.size(); ++q)
+      if (frame.time_s() >= dressed_s || number == range.last)
+        extend(found.extents[q], quantities[q].read(frame, header), recording.path());
     found.tally.add(frame);
     found.times_s.push_back(frame.time_s());
     found.stats.push_back(frame.stats());
@@ -169,6 +216,13 @@ Json colliders_json(const v1::Scene& scene) {
   return colliders;
 }
 
+// Where the frame that was judged is shown.
+std::optional<v1::Verdict> verdict_in(RecordingReader& recording, const FrameRange& range) {
+  auto verdict = recording.verdict();
+  if (verdict && (verdict->frame() < range.first || verdict->frame() > range.last)) verdict.reset();
+  return verdict;
+}
+
 // A recording on its way to the page.
 struct Source {
   Source(const Exhibit& exhibit, const FrameRange& wanted)
@@ -179,6 +233,7 @@ struct Source {
         summary(summary_of(recording, range)),
         cloth(cloth_of(recording)),
         colliders(colliders_json(with_bodies(recording.scene(), recording.assets()))),
+        verdict(verdict_in(recording, range)),
         quantum_m(quantum_of(cloth, summary)) {}
 
   std::string name;
@@ -188,8 +243,10 @@ struct Source {
   Summary summary;
   std::vector<ClothMesh> cloth;
   Json colliders;
+  std::optional<v1::Verdict> verdict;
   double quantum_m;
   std::string frames{};  // packed
+  std::string values{};  // packed
 };
 
 // Triangles of all sheets, of particles counted from the first of all.
@@ -217,6 +274,49 @@ void pack(Source& source) {
   frames.finish();
 }
 
+// Of each quantity, frame after frame: a level of every particle as the difference to that before.
+void pack_values(Source& source) {
+  source.values.clear();
+  Deflated deflated([&](std::string_view text) { source.values += text; });
+  const std::vector<Quantity> quantities = quantities_of(source.recording.header().format());
+  for (std::size_t q = 0; q < quantities.size(); ++q) {
+    std::vector<unsigned char> before(particles_of(source.recording.header()));
+    for (auto number = source.range.first; number <= source.range.last; ++number) {
+      const std::vector<double> values =
+          quantities[q].read(source.recording.read(number), source.recording.header());
+      std::string differences(values.size(), '\0');
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        const unsigned char level = source.summary.extents[q].levels.of(values[i]);
+        differences[i] = static_cast<char>(level - std::exchange(before[i], level));
+      }
+      deflated.add(differences);
+    }
+  }
+  deflated.finish();
+}
+
+// Values take so many characters at most, in fewer levels where it takes that.
+void pack_values(Source& source, std::size_t room) {
+  constexpr int kFewest = 31;
+  if (source.summary.extents.empty()) return;
+  for (;;) {
+    pack_values(source);
+    if (source.values.size() <= room || source.summary.extents[0].levels.most <= kFewest) return;
+    for (Extent& extent : source.summary.extents) extent.levels.most /= 2;
+  }
+}
+
+Json values_json(const Source& source) {
+  Json json;
+  const std::vector<Quantity> quantities = quantities_of(source.recording.header().format());
+  for (std::size_t q = 0; q < quantities.size(); ++q) {
+    const auto& [levels, scale] = source.summary.extents[q];
+    json[quantities[q].name] = {
+        {"low", levels.low}, {"high", levels.high}, {"most", levels.most}, {"scale", scale}};
+  }
+  return json;
+}
+
 Json recording_json(const Source& source) {
   const RecordingReader& recording = source.recording;
   const Summary& summary = source.summary;
@@ -234,6 +334,9 @@ Json recording_json(const Source& source) {
           {"low_m", summary.low},
           {"high_m", summary.high},
           {"stats", recording.header().format().stats() ? stats_json(summary.stats) : Json()},
+          {"values", values_json(source)},
+          {"phases", phases_json(recording.scene())},
+          {"verdict", source.verdict ? to_json(*source.verdict) : Json()},
           {"sheets", sheets_json(recording, source.cloth)},
           {"colliders", source.colliders},
           {"gravity_m_per_s2",
@@ -311,7 +414,14 @@ PageResult write_page(const PageOrder& order,
     const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
     return plain_script("page", deflated(text));
   };
-  const std::size_t rest = page.size() + description().size();
+  // positions are what is left for
+  constexpr std::size_t kPart = 4;
+  std::size_t rest = page.size();
+  for (Source& source : sources) {
+    pack_values(source, order.most_bytes / kPart / sources.size());
+    rest += source.values.size();
+  }
+  rest += description().size();
   const std::size_t room = order.most_bytes > rest ? order.most_bytes - rest : 0;
   pack_all(sources, room, [&](const Source& source) {
     progress(fmt::format("{}: {}", order.path, source.recording.path()));
@@ -322,6 +432,8 @@ PageResult write_page(const PageOrder& order,
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const Source& source = sources[i];
     recordings += plain_script(fmt::format("frames-{}", i), source.frames);
+    if (!source.values.empty())
+      recordings += plain_script(fmt::format("values-{}", i), source.values);
     result.frames += source.summary.tally.frames;
     result.largest_error_m = std::max(result.largest_error_m, source.quantum_m / 2);
   }

@@ -45,6 +45,19 @@ function unpack(bytes, frames, particles) {
   return numbers;
 }
 
+// Values that were recorded: of each quantity and frame a byte of every particle, the difference to the frame
+// before. Level q of the most that there are stands for low + (high - low) (q / most)^2.
+function unpackValues(bytes, kinds, frames, particles) {
+  let at = 0;
+  const values = {};
+  for (const [name, kind] of Object.entries(kinds)) {
+    const levels = bytes.subarray(at, at += frames * particles);
+    for (let i = particles; i < levels.length; ++i) levels[i] += levels[i - particles];
+    values[name] = {...kind, levels};
+  }
+  return values;
+}
+
 // Index of the last time that is not after t; 0 where all are.
 function indexAt(times, t) {
   let low = 0;
@@ -58,12 +71,13 @@ function indexAt(times, t) {
 
 // What the page says of a recording, with its frames.
 class Recording {
-  constructor(facts, numbers) {
+  constructor(facts, numbers, values) {
     Object.assign(this, facts);
+    this.recorded = values;
     this.numbers = numbers;
     this.values = 3 * this.particles;
     this.cloth = new Cloth(this.sheets, this.particles);
-    this.most = {};  // largest value of a quantity over all frames
+    this.most = {};  // largest value of a quantity over all frames, of a garment once it is put on
   }
 
   // Where between two frames t lies.
@@ -95,12 +109,24 @@ class Recording {
     }
   }
 
+  has(quantity) { return quantity in this.recorded; }
+
+  // Of every particle, as far as the page has them.
+  writeValues(quantity, out, frame) {
+    const {levels, low, high, most} = this.recorded[quantity];
+    for (let i = 0, k = frame * this.particles; i < this.particles; ++i, ++k) out[i] = low + (high - low) * (levels[k] / most) ** 2;
+  }
+
   largest(quantity) {
-    if (!(quantity in this.most)) {
+    if (!(quantity in this.most) && this.has(quantity)) {
+      this.most[quantity] = roundUp(this.recorded[quantity].scale);
+    } else if (!(quantity in this.most)) {
       const positions = new Float32Array(this.values);
       const values = new Float32Array(this.particles);
       this.most[quantity] = 0;
-      for (let frame = 0; frame < this.time_s.length; ++frame) {
+      const dressed_s = Math.max(0, ...this.phases.map(({until_s = 0}) => until_s));
+      const first = Math.min(this.time_s.length - 1, dressed_s > 0 ? indexAt(this.time_s, dressed_s) + 1 : 0);
+      for (let frame = first; frame < this.time_s.length; ++frame) {
         this.write(positions, {frame, next: frame, share: 0});
         kQuantities[quantity].write(this, values, positions, frame);
         this.most[quantity] = largestOf(values, this.most[quantity]);

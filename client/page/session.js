@@ -52,7 +52,7 @@ class Conversation {
     if (typeof data !== 'string') {
       const length = new Uint32Array(data, 0, 1)[0];
       const said = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-      this.done({...said, positions: new Float32Array(data, 4 + length)});
+      this.done({...said, arrays: new Float32Array(data, 4 + length)});
       return;
     }
     const said = data ? JSON.parse(data) : {error: {message: 'The server ended the stream.', violations: []}};
@@ -64,11 +64,12 @@ class Conversation {
 
 // A session as it is seen: the newest frame, and the one before.
 class Sight {
-  constructor(session, {sheets, uid}) {
+  constructor(session, {sheets, uid, format}) {
     const {scene, name} = session;
     this.session = session;
     this.name = shortName(name);
     this.uid = uid;
+    this.format = format;
     this.sheets = sheets.map((layout, k) => ({
       ...layout,
       spacing_m: scene.sheets[k].grid?.spacing_m,
@@ -78,18 +79,31 @@ class Sight {
     this.particles = this.sheets.reduce((sum, sheet) => sum + particlesOf(sheet), 0);
     this.colliders = scene.colliders;
     this.gravity_m_per_s2 = scene.environment.gravity_m_per_s2;
+    this.phases = session.phases;
     this.origin_m = [0, 0, 0];
-    this.most = {};  // largest value of a quantity so far
+    this.most = {};  // largest value of a quantity so far, of a garment since it is put on
   }
+
+  // What a frame may have beside positions.
+  has() { return this.colliders.length > 0; }
+
+  // What goes on in the frame.
+  get phase() {
+    const {name} = this.phases.find(({until_s}) => until_s === undefined || this.frame.time_s < until_s) ?? {};
+    return name && this.isDressed && this.frame.stats.at_rest ? 'at rest' : name;
+  }
+  get isDressed() { return this.phases.every(({until_s = 0}) => this.frame.time_s >= until_s); }
 
   // The triangles of a sheet, which come before the frames where it is no grid.
   layOut({sheet, mesh}) { this.sheets[sheet].mesh = mesh; }
 
   get cloth() { return this.made ??= new Cloth(this.sheets, this.particles); }
 
-  take({frame, positions}) {
+  // arrays: positions, then what else was asked for, one number of each particle.
+  take({frame, arrays}) {
     this.before = this.frame;
-    this.frame = {...frame, positions};
+    const end = 3 * this.particles;
+    this.frame = {...frame, positions: arrays.subarray(0, end), values: arrays.subarray(end)};
   }
 
   sheetOf(particle) {
@@ -118,8 +132,16 @@ class Sight {
     }
   }
 
+  // What was asked for beside positions; nothing before it comes.
+  writeValues(quantity, out) {
+    if (this.format[quantity]) out.set(this.frame.values); else out.fill(0);
+  }
+
   largest(quantity, values) {
-    this.most[quantity] = largestOf(values, this.most[quantity]);
+    const {recorded} = kQuantities[quantity];
+    const now = recorded ? roundMost(values) : largestOf(values);
+    if (!this.isDressed) return now;
+    this.most[quantity] = Math.max(now, this.most[quantity] ?? 0);
     return this.most[quantity];
   }
 

@@ -24,6 +24,37 @@ function row(...cells) {
   return made;
 }
 
+// What keeps a drape from being good, and its numbers; one card for each of these that has a verdict.
+function showVerdicts(place, sources, heading) {
+  const judged = sources.filter(({verdict}) => verdict);
+  place.replaceChildren(...judged.map(({name, verdict}) => {
+    const made = document.createElement('section');
+    made.className = verdict.good ? 'good' : 'bad';
+    const says = verdict.good ? '✓ Good drape' : '✕ Not a good drape';
+    made.append(cell(heading ? 'h3' : 'h2', judged.length > 1 ? `${name}: ${says}` : says));
+    if (heading) made.append(cell('small', heading));
+    if (verdict.faults?.length > 0) {
+      const faults = document.createElement('ul');
+      faults.append(...verdict.faults.map(({message: why}) => cell('li', why)));
+      made.append(faults);
+    }
+    const count = (number, what) => `${number} ${what}${number === 1 ? '' : 's'}`;
+    const inside = Number(verdict.particles_inside ?? 0);
+    const facts = [
+      ['at rest', verdict.at_rest ? 'yes' : 'no'],
+      ['cuts of cloth', Number(verdict.cloth_cut_count ?? 0) === 0 ? 'none' : `${verdict.cloth_cut_count}`],
+      ['in the body', inside === 0 ? 'nothing' : `${count(inside, 'particle')}, up to ${inUnits(1000 * verdict.deepest_m, 'mm')}`],
+      ['99 % of strain', `up to ${percent(verdict.strain_warp ?? 0)} warp, ${percent(verdict.strain_weft ?? 0)} weft`],
+      ['pressure', `up to ${inUnits((verdict.largest_pressure_pa ?? 0) / 1000, 'kPa')}`],
+      ...(verdict.slid_m ? [['slid', inUnits(1000 * verdict.slid_m, 'mm')]] : []),
+    ];
+    const list = document.createElement('dl');
+    list.append(...facts.flatMap(([label, text]) => [cell('dt', label), cell('dd', text)]));
+    made.append(list);
+    return made;
+  }));
+}
+
 const digits = (value) => (value !== 0 && Math.abs(value) < 1e-3 ? value.toExponential(2) : value.toPrecision(4));
 
 function setPlaying(playing) {
@@ -46,6 +77,8 @@ class Stage {
     this.quantity = '';
     this.stale = true;
     this.fitted = true;  // nobody has turned the view yet
+    this.ray = new THREE.Raycaster();
+    this.place = undefined;  // that is marked: the pane, and where on its cloth
     new ResizeObserver(() => this.resize()).observe($('stage'));
   }
 
@@ -59,18 +92,57 @@ class Stage {
     this.up = gravity.length() > 0 ? gravity.negate().normalize() : new THREE.Vector3(0, 1, 0);
     this.box = this.boxOf(sources);
     this.panes = sources.map((source) => new Pane(source, this.box, this.up));
-    for (const pane of this.panes) pane.lines.visible = isPressed($('lines'));
+    this.place = undefined;
+    $('lines').checked = this.linesChosen ?? sources.some(({sheets}) => sheets.some(({mesh}) => mesh));
+    this.listLayers();
+    this.offerColours();
     this.namePanels();
     this.layOut();
     this.makeCamera();
   }
 
-  // Around the particles and the bodies, as far as these are not much larger.
-  boxOf(sources) {
+  // What can be hidden.
+  listLayers() {
+    const names = [...new Set(this.panes.flatMap(({source}) => source.sheets.map(({name}) => name)))];
+    $('sheets').replaceChildren(...(names.length > 1 ? names : []).map((name) => {
+      const box = Object.assign(document.createElement('input'), {type: 'checkbox', checked: true, name});
+      const label = cell('label', '');
+      label.append(box, ` ${name}`);
+      return label;
+    }));
+    $('bodies').closest('label').hidden = this.panes.every(({bodies}) => bodies.length === 0);
+    this.showLayers();
+  }
+
+  showLayers() {
+    const hidden = new Set([...$('sheets').querySelectorAll('input:not(:checked)')].map(({name}) => name));
+    for (const pane of this.panes) {
+      pane.lines.visible = $('lines').checked;
+      pane.hideSheets(hidden);
+      for (const {mesh} of pane.bodies) mesh.visible = $('bodies').checked;
+    }
+    this.stale = true;
+  }
+
+  // Those of what is recorded, of all that is shown.
+  offerColours() {
+    for (const option of $('colour').options) {
+      if (!kQuantities[option.value]?.recorded) continue;
+      option.hidden = option.disabled = !this.panes.every(({source}) => source.has(option.value));
+    }
+  }
+
+  clothBoxOf(sources) {
     const box = new THREE.Box3();
     for (const {low_m, high_m} of sources) {
       box.expandByPoint(new THREE.Vector3(...low_m)).expandByPoint(new THREE.Vector3(...high_m));
     }
+    return box;
+  }
+
+  // Around the particles and the bodies, as far as these are not much larger.
+  boxOf(sources) {
+    const box = this.clothBoxOf(sources);
     const reach = box.getSize(new THREE.Vector3()).length();
     for (const {colliders} of sources) {
       for (const collider of colliders) {
@@ -94,9 +166,16 @@ class Stage {
     this.fit();
   }
 
+  // What is to be seen: of a garment that is put on, itself.
+  focus() {
+    const sources = this.panes.map(({source}) => source);
+    return sources.some(({phases}) => phases.length > 0) ? this.clothBoxOf(sources) : this.box;
+  }
+
   // From the front, a little from the right and above, as near as the box allows.
   fit() {
-    const centre = this.box.getCenter(new THREE.Vector3());
+    const box = this.focus();
+    const centre = box.getCenter(new THREE.Vector3());
     const radius = this.box.getSize(new THREE.Vector3()).length() / 2;
     const {front, right} = frontOf(this.up);
     const from = front.addScaledVector(right, 0.55).addScaledVector(this.up, 0.45).normalize();
@@ -105,7 +184,7 @@ class Stage {
     const {width, height} = this.split();
     const tangent = 0.9 * Math.tan(this.camera.fov / 2 * Math.PI / 180);
     let distance = 0;
-    for (const corner of cornersOf(this.box)) {
+    for (const corner of cornersOf(box)) {
       corner.sub(centre);
       const across = Math.max(Math.abs(corner.dot(y)), Math.abs(corner.dot(x)) * height / width);
       distance = Math.max(distance, corner.dot(from) + across / tangent);
@@ -138,14 +217,27 @@ class Stage {
     this.stale = true;
   }
 
+  // Where space is shown, and beside or below it the pattern of a single pane, in pixels from the upper left.
+  regions() {
+    const {clientWidth: width, clientHeight: height} = $('stage');
+    const whole = {left: 0, top: 0, width, height};
+    if (!isPressed($('pattern')) || this.panes.length !== 1) return {space: whole};
+    if (width > height) {
+      const left = Math.round(0.55 * width);
+      return {space: {...whole, width: left}, flat: {...whole, left, width: width - left}};
+    }
+    const top = Math.round(0.55 * height);
+    return {space: {...whole, height: top}, flat: {...whole, top, height: height - top}};
+  }
+
   // The grid of panes whose shorter side is longest.
   split() {
-    const {clientWidth, clientHeight} = $('stage');
+    const {space} = this.regions();
     const count = Math.max(1, this.panes.length);
     let best;
     for (let columns = 1; columns <= count; ++columns) {
       const rows = Math.ceil(count / columns);
-      const shape = {columns, rows, width: clientWidth / columns, height: clientHeight / rows};
+      const shape = {columns, rows, width: space.width / columns, height: space.height / rows};
       if (!best || Math.min(shape.width, shape.height) > Math.min(best.width, best.height)) best = shape;
     }
     return best;
@@ -167,6 +259,8 @@ class Stage {
 
   draw() {
     this.stale = false;
+    const {space, flat} = this.regions();
+    if (flat) this.panes[0].pattern.fit(flat.width, flat.height);
     for (const pane of this.panes) pane.show(this.time, this.playing, this.quantity);
     this.colour();
 
@@ -175,9 +269,11 @@ class Stage {
     const {columns, rows, width, height} = this.split();
     const size = this.renderer.getSize(new THREE.Vector2());
     if (size.x !== clientWidth || size.y !== clientHeight) this.renderer.setSize(clientWidth, clientHeight, false);
+    Object.assign($('names').style, {width: `${space.width}px`, height: `${space.height}px`});
     $('names').style.gridTemplate = `repeat(${rows}, 1fr) / repeat(${columns}, 1fr)`;
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    this.markPlace();
     this.panes.forEach((pane, k) => {
       $('names').children[k].className = `${k % columns > 0 ? 'right' : ''} ${k >= columns ? 'below' : ''}`;
       const left = (k % columns) * width;
@@ -186,12 +282,97 @@ class Stage {
       this.renderer.setScissor(left, bottom, width, height);
       this.renderer.render(pane.scene, this.camera);
     });
+    this.drawPattern(flat);
     this.drawn();
+  }
+
+  drawPattern(region) {
+    $('cut').hidden = !region;
+    if (!region) return;
+    const [{pattern}] = this.panes;
+    const {left, top, width, height} = region;
+    const bottom = $('stage').clientHeight - top - height;
+    this.renderer.setViewport(left, bottom, width, height);
+    this.renderer.setScissor(left, bottom, width, height);
+    this.renderer.render(pattern.scene, pattern.camera);
+
+    // names on the panels that have room for them
+    Object.assign($('cut').style, {left: `${left}px`, top: `${top}px`, width: `${width}px`, height: `${height}px`});
+    $('cut').className = left > 0 ? 'right' : 'below';
+    const shown = [pattern, left, top, width, height];
+    if (shown.every((each, k) => each === this.named?.[k])) return;
+    this.named = shown;
+    const pixels = width / (pattern.camera.right - pattern.camera.left);
+    $('cut').replaceChildren(...pattern.cloth.panels.map(({name}, k) => {
+      const {box, size} = pattern.boxes[k];
+      const label = document.createElement('div');
+      label.append(cell('span', name));
+      const at = new THREE.Vector3((box.min.x + box.max.x) / 2, (box.min.y + box.max.y) / 2, 0).project(pattern.camera);
+      Object.assign(label.style, {left: `${50 * (1 + at.x)}%`, top: `${50 * (1 - at.y)}%`,
+        width: `${Math.round(0.94 * pixels * size.x)}px`});
+      return label;
+    }));
+    for (const label of $('cut').children) label.hidden = label.scrollWidth > label.clientWidth + 1;
+  }
+
+  // ---- what a pointer is over
+
+  // The pane there, with the ray through it; of the pattern where it is over that.
+  aim({clientX, clientY}) {
+    const box = $('stage').getBoundingClientRect();
+    const [x, y] = [clientX - box.left, clientY - box.top];
+    const within = ({left, top, width, height}) => x >= left && x < left + width && y >= top && y < top + height;
+    const through = (camera, {left, top, width, height}) => this.ray.setFromCamera(
+      new THREE.Vector2(2 * (x - left) / width - 1, 1 - 2 * (y - top) / height), camera);
+    const {flat} = this.regions();
+    if (flat && within(flat)) {
+      through(this.panes[0].pattern.camera, flat);
+      return {pane: this.panes[0], onPattern: true};
+    }
+    const {columns, width, height} = this.split();
+    for (const [k, pane] of this.panes.entries()) {
+      const region = {left: (k % columns) * width, top: Math.floor(k / columns) * height, width, height};
+      if (!within(region)) continue;
+      through(this.camera, region);
+      return {pane, onPattern: false};
+    }
+    return undefined;
+  }
+
+  // The pane, and the place on its cloth that is seen there.
+  find(event) {
+    const aimed = this.aim(event);
+    if (!aimed) return undefined;
+    const {pane, onPattern} = aimed;
+    const bodies = pane.bodies.map(({mesh}) => mesh).filter(({visible}) => visible);
+    const place = onPattern ? pane.placeAt(this.ray, [pane.pattern.mesh])
+      : pane.placeAt(this.ray, pane.cloth.children.slice(0, 2), bodies);
+    return place && {pane, place};
+  }
+
+  // Marks what the pointer is over, and says which panel that is.
+  point(event) {
+    if (event.buttons !== 0 || this.panes.length === 0) return;
+    this.pointed = event;
+    this.stale = true;
+  }
+
+  markPlace() {
+    if (this.pointed) this.place = this.find(this.pointed);
+    this.pointed = undefined;
+    for (const pane of this.panes) pane.markPlace(this.place?.pane === pane ? this.place.place : undefined);
+    $('probe').hidden = !this.place;
+    if (!this.place) return;
+    const {pane, place} = this.place;
+    const known = kQuantities[this.quantity];
+    $('probe').replaceChildren(cell('b', pane.source.cloth.panelOf(place.triangle).name),
+      known ? ` ${known.text(pane.valueAt(place)).replace(/^-/, '−')}` : '');
   }
 
   // One scale for all panes, so that equal colours are equal values.
   colour() {
     const known = kQuantities[this.quantity];
+    const textOf = (value) => known.text(value).replace(/^-/, '−');
     $('legend').hidden = !this.quantity;
     $('panels').hidden = !this.quantity || known;
     for (const id of ['scale', 'now-label']) $(id).hidden = !known;
@@ -199,11 +380,13 @@ class Stage {
     let most = 0;
     if (known) {
       for (const {source, values} of this.panes) {
-        most = Math.max(most, $('now').checked ? largestOf(values) : source.largest(this.quantity, values));
+        const ofFrame = known.recorded ? roundMost : largestOf;
+        most = Math.max(most, $('now').checked ? ofFrame(values) : source.largest(this.quantity, values));
       }
-      $('ramp').style.background = `linear-gradient(90deg, ${(known.balanced ? kBalance : kRamp).join(', ')})`;
-      $('least').textContent = known.balanced ? `−${known.text(most)}` : '0';
-      $('most').textContent = known.text(most);
+      $('ramp').style.background = `linear-gradient(90deg, ${rampOf(known).join(', ')})`;
+      $('ramp').textContent = known.balanced ? '0' : '';
+      $('least').textContent = known.balanced ? `−${textOf(most)}` : '0';
+      $('most').textContent = `${textOf(most)}${known.recorded ? ' or more' : ''}`;
     }
     for (const pane of this.panes) pane.colourBy(this.quantity, most);
   }
@@ -226,16 +409,24 @@ class Stage {
     }
   }
 
+  colourChosen() {
+    this.quantity = $('colour').value === 'cloth' ? '' : $('colour').value;
+    this.stale = true;
+  }
+
   paint() {
     for (const pane of this.panes) pane.paint();
     this.stale = true;
   }
 
-  toggleLines() {
-    const shown = !isPressed($('lines'));
-    $('lines').setAttribute('aria-pressed', shown);
-    for (const pane of this.panes) pane.lines.visible = shown;
-    this.stale = true;
+  toggleLayer(id) {
+    $(id).checked = !$(id).checked;
+    $(id).dispatchEvent(new Event('change', {bubbles: true}));
+  }
+
+  togglePattern() {
+    $('pattern').setAttribute('aria-pressed', !isPressed($('pattern')));
+    this.resize();
   }
 
   toggleTheme() {
@@ -246,10 +437,7 @@ class Stage {
 
   // The tools, and the keys: these of both pages and others.
   listen(others) {
-    const colour = () => {
-      this.quantity = $('colour').value === 'cloth' ? '' : $('colour').value;
-      this.stale = true;
-    };
+    const colour = () => this.colourChosen();
     const nextColour = () => {
       const {options, selectedIndex} = $('colour');
       const order = [...options].slice(selectedIndex + 1).concat(...options);
@@ -258,12 +446,33 @@ class Stage {
     };
     $('colour').addEventListener('change', colour);
     $('now').addEventListener('change', () => { this.stale = true; });
-    $('lines').addEventListener('click', () => this.toggleLines());
+    $('layers').addEventListener('change', ({target}) => {
+      if (target === $('lines')) this.linesChosen = target.checked;
+      this.showLayers();
+    });
+    document.addEventListener('pointerdown', ({target}) => {
+      if (!$('show').contains(target)) $('show').open = false;
+    });
+    $('pattern').addEventListener('click', () => this.togglePattern());
+    // the pattern stands still
+    const guard = (event) => { this.controls.enabled = !this.aim(event)?.onPattern; };
+    for (const kind of ['pointerdown', 'wheel']) $('stage').addEventListener(kind, guard, {capture: true, passive: true});
+    $('view').addEventListener('pointermove', (event) => this.point(event));
+    $('view').addEventListener('pointerup', (event) => {
+      if (event.pointerType === 'touch') this.point({clientX: event.clientX, clientY: event.clientY, buttons: 0});
+    });
+    $('view').addEventListener('pointerleave', ({pointerType}) => {
+      if (pointerType === 'touch') return;
+      this.place = this.pointed = undefined;
+      this.stale = true;
+    });
     $('fit').addEventListener('click', () => this.fit());
     $('theme').addEventListener('click', () => this.toggleTheme());
 
     const keys = {
-      f: () => this.fit(), l: () => this.toggleLines(), t: () => this.toggleTheme(), c: nextColour,
+      f: () => this.fit(), t: () => this.toggleTheme(), c: nextColour, u: () => this.togglePattern(),
+      l: () => this.toggleLayer('lines'), b: () => this.toggleLayer('bodies'),
+      Escape: () => { $('show').open = false; },
       w: () => this.turn(0, -0.1), s: () => this.turn(0, 0.1),
       a: () => this.turn(-0.1, 0), d: () => this.turn(0.1, 0),
       '+': () => this.turn(0, 0, 0.9), '=': () => this.turn(0, 0, 0.9), '-': () => this.turn(0, 0, 1.1),

@@ -20,6 +20,9 @@ class Viewer extends Stage {
     this.ticks = times.filter((t, k) => k === 0 || t - times[k - 1] > kSameTime);
     $('scrub').max = this.ticks.length - 1;
     $('transport').hidden = this.ticks.length < 2;
+    this.phases = phasesOf(recordings[0], this.ticks);
+    showPhases(this.phases);
+    showVerdicts($('verdicts'), recordings);
     showFacts(figure, recordings, this.panes[0].gridCell);
     this.goTo(this.ticks[0]);
   }
@@ -118,10 +121,37 @@ async function recordingAt(index) {
   if (!unpacked[index]) {
     const facts = page.recordings[index];
     const bytes = await inflate(`frames-${index}`);
-    unpacked[index] = new Recording(facts, unpack(bytes, facts.time_s.length, facts.particles));
+    const [frames, particles] = [facts.time_s.length, facts.particles];
+    const kinds = facts.values ?? {};
+    const values = facts.values ? unpackValues(await inflate(`values-${index}`), kinds, frames, particles) : {};
+    unpacked[index] = new Recording(facts, unpack(bytes, frames, particles), values);
   }
   return unpacked[index];
 }
+
+// ---- dressing
+
+// What goes on from which tick on, with how many ticks: of phases that end at a time, or with the last tick.
+function phasesOf({phases}, ticks) {
+  let from = 0;
+  return (phases ?? []).flatMap(({name, until_s}) => {
+    const next = until_s === undefined ? ticks.length - 1 : indexAt(ticks, until_s);
+    const [first, count] = [from, next - from];
+    from = Math.max(from, next);
+    return count > 0 ? [{name, first, count}] : [];
+  });
+}
+
+function showPhases(phases) {
+  $('phases').hidden = phases.length < 2;
+  $('phases').replaceChildren(...phases.map(({name, count}) => {
+    const part = cell('span', name, {title: name});
+    part.style.flexGrow = count;
+    return part;
+  }));
+}
+
+const phaseAt = (phases, tick) => phases.findLast(({first}) => first <= tick);
 
 // ---- facts
 
@@ -136,6 +166,12 @@ const kCurrent = [
   ['cuts of cloth', (r, k) => r.stats?.cloth_cut_count && `${r.stats.cloth_cut_count[k]}`],
 ];
 let currentCells = [];
+
+// Of what was recorded beside positions.
+function levelsText(recordings) {
+  const levels = recordings.flatMap(({recorded}) => Object.values(recorded).map(({most}) => most + 1));
+  return levels.length > 0 ? ` Pressure and clearance are in ${Math.min(...levels)} levels, closer to each other near 0.` : '';
+}
 
 function showFacts(figure, recordings, gridCell) {
   $('caption').textContent = figure.caption;
@@ -179,7 +215,7 @@ function showFacts(figure, recordings, gridCell) {
   const grid = gridCell >= 1 ? `${gridCell} m` : `${Number((1000 * gridCell).toPrecision(2))} mm`;
   $('precision').textContent = `Positions on this page are within ${(1e6 * error).toPrecision(2)} µm of the ` +
     `recording along each axis; strain, speed and bending energy are computed from them, the energy by the ` +
-    `rigidities of the textile at the start. While it plays, positions between two frames are interpolated. ` +
+    `rigidities of the textile at the start.${levelsText(recordings)} While it plays, positions between two frames are interpolated. ` +
     `The grid has cells of ${grid}.`;
 }
 
@@ -188,8 +224,13 @@ function showTime(viewer) {
   $('scrub').value = index;
   const last = viewer.ticks[viewer.ticks.length - 1];
   const clock = `${viewer.time.toFixed(3)} / ${last.toFixed(3)} s`;
+  const phase = phaseAt(viewer.phases, index);
   $('clock').textContent = clock;
-  $('scrub').setAttribute('aria-valuetext', clock);
+  $('scrub').setAttribute('aria-valuetext', phase ? `${clock}, ${phase.name}` : clock);
+  [...$('phases').children].forEach((part, k) => {
+    part.setAttribute('aria-current', viewer.phases[k] === phase);
+    part.classList.toggle('narrow', part.scrollWidth > part.clientWidth + 1);
+  });
   viewer.panes.forEach(({source, frame}, pane) => {
     kCurrent.forEach(([, text], k) => {
       currentCells[k][pane].textContent = (text(source, frame) ?? 'not recorded').replaceAll(' ', '\u00a0');

@@ -37,6 +37,13 @@ inline constexpr const char* kTriangleTables = R"(
     data BLOB NOT NULL);          -- weft.v1.MeshData
 )";
 
+// Where the session was judged at the last frame.
+inline constexpr const char* kVerdictTable = R"(
+  CREATE TABLE verdict (
+    verdict BLOB NOT NULL,        -- weft.v1.Verdict
+    checksum INTEGER NOT NULL);   -- CRC-32 of the column before
+)";
+
 std::int64_t checksum_of(std::initializer_list<std::string_view> parts);
 // Of the extent: without a frame.
 std::int64_t checksum_of_frame(std::string_view uid, std::int64_t number,

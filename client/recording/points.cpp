@@ -18,20 +18,10 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "frames are little-endian");
 
 template <class Number>
-std::vector<double> read_plane(const std::string& planes, std::size_t plane, std::size_t first,
-                               std::size_t count) {
-  const std::size_t particles = planes.size() / (3 * sizeof(Number));
-  std::vector<Number> numbers(count);
-  std::memcpy(numbers.data(), planes.data() + (plane * particles + first) * sizeof(Number),
-              count * sizeof(Number));
+std::vector<double> numbers_in(const std::string& array) {
+  std::vector<Number> numbers(array.size() / sizeof(Number));
+  if (!numbers.empty()) std::memcpy(numbers.data(), array.data(), array.size());
   return {numbers.begin(), numbers.end()};
-}
-
-template <class Number>
-Points read_planes(const std::string& planes, std::size_t first, std::size_t count) {
-  return {.x = read_plane<Number>(planes, 0, first, count),
-          .y = read_plane<Number>(planes, 1, first, count),
-          .z = read_plane<Number>(planes, 2, first, count)};
 }
 
 // The bytes in a packed array, where they are byte planes of so many numbers.
@@ -48,31 +38,43 @@ std::optional<std::string> unpack(const std::string& array, std::size_t numbers)
   return bytes;
 }
 
-// An array of FRAME_ENCODING_QUANTIZED_ZSTD in FRAME_ENCODING_FLOAT64.
-std::string as_doubles(const std::string& array, const v1::StreamHeader& header) {
-  const std::size_t particles = particle_count(header);
-  const std::string bytes = unpack(array, 3 * particles).value();
-  std::vector<std::uint64_t> numbers(3 * particles);
+// The numbers of an array of FRAME_ENCODING_QUANTIZED_ZSTD: planes of `count` each.
+std::vector<double> unpacked(const std::string& array, std::size_t planes, std::size_t count,
+                             double step) {
+  const std::string bytes = unpack(array, planes * count).value();
+  std::vector<std::uint64_t> numbers(planes * count);
   const char* byte = bytes.data();
   for (std::size_t plane = 0; plane < bytes.size() / numbers.size(); ++plane) {
     for (std::uint64_t& number : numbers)
       number |= std::uint64_t{static_cast<unsigned char>(*byte++)} << 8 * plane;
   }
-  const double step = header.format().grid_step_m();
   std::vector<double> values(numbers.size());
-  for (std::size_t first = 0; first < numbers.size(); first += particles) {
+  for (std::size_t first = 0; first < numbers.size(); first += count) {
     std::uint64_t steps = 0;
-    for (std::size_t i = first; i < first + particles; ++i) {
+    for (std::size_t i = first; i < first + count; ++i) {
       steps += numbers[i] >> 1 ^ -(numbers[i] & 1);
       values[i] = static_cast<double>(static_cast<std::int64_t>(steps)) * step;
     }
   }
-  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double)};
+  return values;
 }
 
-// Three numbers of each particle, or triangle.
-bool is_whole(const std::string& array, const v1::FrameFormat& format, std::size_t count) {
-  const std::size_t numbers = 3 * count;
+// An array of planes of `count` numbers; those of QUANTIZED_ZSTD are multiples of the grid step
+// times `scale`.
+std::vector<double> read_planes(const std::string& array, const v1::StreamHeader& header,
+                                std::size_t planes, double scale = 1) {
+  if (array.empty()) return {};
+  switch (header.format().encoding()) {
+    case v1::FRAME_ENCODING_FLOAT64:
+      return numbers_in<double>(array);
+    case v1::FRAME_ENCODING_QUANTIZED_ZSTD:
+      return unpacked(array, planes, particle_count(header), scale * header.format().grid_step_m());
+    default:
+      return numbers_in<float>(array);
+  }
+}
+
+bool is_whole(const std::string& array, const v1::FrameFormat& format, std::size_t numbers) {
   if (numbers == 0) return array.empty();
   switch (format.encoding()) {
     case v1::FRAME_ENCODING_FLOAT64:
@@ -128,29 +130,40 @@ std::size_t triangle_count(const v1::StreamHeader& header) {
 }
 
 bool is_whole(const v1::Frame& frame, const v1::StreamHeader& header) {
+  const v1::FrameFormat& format = header.format();
   const std::size_t particles = particle_count(header);
-  const auto whole = [&](const std::string& array, bool wanted, std::size_t count) {
-    return wanted ? is_whole(array, header.format(), count) : array.empty();
+  const auto whole = [&](const std::string& array, bool wanted, std::size_t numbers) {
+    return wanted ? is_whole(array, format, numbers) : array.empty();
   };
-  return whole(frame.positions_m(), true, particles) &&
-         whole(frame.velocities_m_per_s(), header.format().velocities(), particles) &&
-         whole(frame.strain(), header.format().strain(), triangle_count(header));
+  return whole(frame.positions_m(), true, 3 * particles) &&
+         whole(frame.velocities_m_per_s(), format.velocities(), 3 * particles) &&
+         whole(frame.strain(), format.strain(), 3 * triangle_count(header)) &&
+         whole(frame.pressure_pa(), format.pressure(), particles) &&
+         whole(frame.clearance_m(), format.clearance(), particles);
 }
 
 Points read_points(const std::string& array, const v1::StreamHeader& header, std::size_t first,
                    std::size_t count) {
-  switch (header.format().encoding()) {
-    case v1::FRAME_ENCODING_FLOAT64:
-      return read_planes<double>(array, first, count);
-    case v1::FRAME_ENCODING_QUANTIZED_ZSTD:
-      return read_planes<double>(as_doubles(array, header), first, count);
-    default:
-      return read_planes<float>(array, first, count);
-  }
+  const std::vector<double> values = read_planes(array, header, 3);
+  const auto plane = [&](std::size_t axis) {
+    const auto begin =
+        values.begin() + static_cast<std::ptrdiff_t>(axis * (values.size() / 3) + first);
+    return std::vector(begin, begin + static_cast<std::ptrdiff_t>(count));
+  };
+  return {.x = plane(0), .y = plane(1), .z = plane(2)};
 }
 
 Points read_points(const std::string& array, const v1::StreamHeader& header) {
   return read_points(array, header, 0, particle_count(header));
+}
+
+std::vector<double> read_pressures(const v1::Frame& frame, const v1::StreamHeader& header) {
+  constexpr double kSteps = 1000;  // Pa for each m of the grid step
+  return read_planes(frame.pressure_pa(), header, 1, kSteps);
+}
+
+std::vector<double> read_clearances(const v1::Frame& frame, const v1::StreamHeader& header) {
+  return read_planes(frame.clearance_m(), header, 1);
 }
 
 }  // namespace weft::client

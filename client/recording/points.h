@@ -28,4 +28,8 @@ Points read_points(const std::string& array, const v1::StreamHeader& header, std
 // All of them.
 Points read_points(const std::string& array, const v1::StreamHeader& header);
 
+// Of every particle, of a frame that is whole; none where its format has none.
+std::vector<double> read_pressures(const v1::Frame& frame, const v1::StreamHeader& header);   // Pa
+std::vector<double> read_clearances(const v1::Frame& frame, const v1::StreamHeader& header);  // m
+
 }  // namespace weft::client

@@ -69,6 +69,17 @@ void RecordingReader::read_topology(std::int64_t version) {
     throw damaged(path_, "the triangles of its sheets are not those that its header names");
 }
 
+std::optional<v1::Verdict> RecordingReader::verdict() {
+  if (!database_.prepare("SELECT 1 FROM sqlite_master WHERE name = 'verdict'").step())
+    return std::nullopt;
+  Statement row = database_.prepare("SELECT verdict, checksum FROM verdict");
+  v1::Verdict verdict;
+  if (!row.step() || row.integer(1) != checksum_of({row.bytes(0)}) ||
+      !verdict.ParseFromString(row.bytes(0)))
+    throw damaged(path_, "the checksum of its verdict is wrong");
+  return verdict;
+}
+
 std::int64_t RecordingReader::count_frames() {
   Statement row = database_.prepare("SELECT count(*) FROM frames");
   return row.step() ? row.integer(0) : 0;

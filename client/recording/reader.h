@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include "client/sheet_layout.h"
 #include "weft/v1/frame.pb.h"
 #include "weft/v1/scene.pb.h"
+#include "weft/v1/session.pb.h"
 
 namespace weft::client {
 
@@ -37,6 +39,8 @@ class RecordingReader {
   std::vector<std::pair<std::int64_t, double>> find_around(double time_s);
   // Those that the scene names, as far as the file has them.
   Assets assets();
+  // Of the last frame, where the session was judged.
+  std::optional<v1::Verdict> verdict();
   // What is wrong with the file itself, if anything.
   std::vector<std::string> find_damage();
 

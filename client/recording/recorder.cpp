@@ -17,6 +17,8 @@ v1::StreamFramesRequest stream_request(const v1::Session& session, const Recordi
   if (order.to) request.set_end_frame(*order.to);
   request.mutable_format()->set_encoding(order.encoding);
   request.mutable_format()->set_velocities(order.velocities);
+  request.mutable_format()->set_pressure(order.pressure);
+  request.mutable_format()->set_clearance(order.clearance);
   request.mutable_format()->set_stats(true);
   request.mutable_format()->set_topology(needs_topology(session.scene()));
   request.set_slow_reader(v1::SLOW_READER_HOLD_SESSION);

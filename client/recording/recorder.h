@@ -22,7 +22,7 @@ struct RecordingOrder {
   bool until_rest = false;
   bool through_pauses = false;  // a pause does not end it
   bool run = false;             // lets the session run, as far as it is recorded
-  bool velocities = false;
+  bool velocities = false, pressure = false, clearance = false;
   v1::FrameEncoding encoding = v1::FRAME_ENCODING_FLOAT32;
   std::chrono::seconds patience{60};  // with a connection that is gone
 };

@@ -119,4 +119,15 @@ void RecordingWriter::commit() {
   last_commit_ = Clock::now();
 }
 
+void add_verdict(const std::string& path, const v1::Verdict& verdict) {
+  Database database(path, Database::Access::kCreate);
+  const std::string bytes = verdict.SerializeAsString();
+  database.execute((std::string("BEGIN; ") + kVerdictTable).c_str());
+  database.prepare("INSERT INTO verdict VALUES (?, ?)")
+      .bind_bytes(1, bytes)
+      .bind(2, checksum_of({bytes}))
+      .step();
+  database.execute("COMMIT");
+}
+
 }  // namespace weft::client

@@ -41,4 +41,7 @@ class RecordingWriter {
   Clock::time_point last_commit_;
 };
 
+// Adds to a recording that is written how its last frame was judged.
+void add_verdict(const std::string& path, const v1::Verdict& verdict);
+
 }  // namespace weft::client

@@ -24,6 +24,8 @@ std::shared_ptr<const Frame> frame_of(const v1::Frame& recorded, const v1::Strea
   frame->positions = planes(recorded.positions_m(), header);
   if (header.format().velocities())
     frame->velocities = planes(recorded.velocities_m_per_s(), header);
+  if (header.format().pressure()) frame->pressures = read_pressures(recorded, header);
+  if (header.format().clearance()) frame->clearances = read_clearances(recorded, header);
   frame->stats.kinetic_energy = stats.kinetic_energy_j();
   frame->stats.potential_energy = stats.potential_energy_j();
   frame->stats.largest_strain = stats.largest_strain();

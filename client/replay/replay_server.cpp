@@ -390,6 +390,10 @@ class FrameReplay final : public v1::FrameService::Service {
         find_problems(request.format(), static_cast<std::int64_t>(newest->positions.size()) / 3);
     if (request.format().velocities() && newest->velocities.empty())
       problems.push_back({"format.velocities", "were not recorded; weft record --velocities does"});
+    if (request.format().pressure() && newest->pressures.empty())
+      problems.push_back({"format.pressure", "was not recorded; weft record --pressure does"});
+    if (request.format().clearance() && newest->clearances.empty())
+      problems.push_back({"format.clearance", "was not recorded; weft record --clearance does"});
     if (!problems.empty()) return errors::field_invalid(problems);
     if (start < player_.first_frame()) {
       return errors::frame_expired(

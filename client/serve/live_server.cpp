@@ -13,6 +13,7 @@
 #include "client/commands/commands.h"
 #include "client/frame_parts.h"
 #include "client/page/page.h"
+#include "client/recording/phases.h"
 
 namespace weft::client {
 namespace {
@@ -47,7 +48,8 @@ Json list_all(Connection& connection, const std::string&) {
   return to_json(all);
 }
 
-// A session, without its start: frames show where it is. Bodies have their triangles.
+// A session, without its start: frames show where it is. Bodies have their triangles; phases are
+// those of its dressing.
 Json get(Connection& connection, const std::string& json) {
   v1::Session session = connection.get_session(read_message<v1::GetSessionRequest>(json).name());
   for (v1::Sheet& sheet : *session.mutable_scene()->mutable_sheets()) {
@@ -58,7 +60,9 @@ Json get(Connection& connection, const std::string& json) {
   *bodies.mutable_colliders() = session.scene().colliders();
   const Assets assets = assets_of(connection, bodies);
   *session.mutable_scene() = with_bodies(session.scene(), assets);
-  return to_json(session);
+  Json shown = to_json(session);
+  shown["phases"] = phases_json(session.scene());
+  return shown;
 }
 
 const std::map<std::string, Method>& methods() {
@@ -68,6 +72,7 @@ const std::map<std::string, Method>& methods() {
       {"/weft.v1.SessionService/RunSession", method(&Sessions::RunSession)},
       {"/weft.v1.SessionService/PauseSession", method(&Sessions::PauseSession)},
       {"/weft.v1.SessionService/StepSession", method(&Sessions::StepSession)},
+      {"/weft.v1.SessionService/GetVerdict", method(&Sessions::GetVerdict)},
       {"/weft.v1.SessionService/UpdateTextile", method(&Sessions::UpdateTextile)},
       {"/weft.v1.TextileService/ListTextiles", method(&Textiles::ListTextiles)},
   };
@@ -99,14 +104,19 @@ bool is_whole(v1::ViewFramesResponse& response, Parts& parts) {
 
 WebMessage message_of(v1::ViewFramesResponse response) {
   if (!response.has_frame()) return {.bytes = to_json(response).dump()};
-  const std::string positions = std::move(*response.mutable_frame()->mutable_positions_m());
-  response.mutable_frame()->clear_positions_m();
+  v1::Frame& frame = *response.mutable_frame();
+  std::string arrays;
+  for (std::string* array :
+       {frame.mutable_positions_m(), frame.mutable_pressure_pa(), frame.mutable_clearance_m()}) {
+    arrays += *array;
+    array->clear();
+  }
   std::string json = to_json(response).dump();
   json.append((4 - json.size() % 4) % 4, ' ');
   const auto length = static_cast<std::uint32_t>(json.size());
   std::string bytes(sizeof length, '\0');
   std::memcpy(bytes.data(), &length, sizeof length);
-  return {.bytes = bytes + json + positions, .binary = true};
+  return {.bytes = bytes + json + arrays, .binary = true};
 }
 
 // A stream of the server: passes on what the browser says, if anything, and answers with the next

@@ -52,4 +52,11 @@ void cap_stretch(SheetDefinition& sheet, const Environment& environment, double 
   for (PanelTextile& panel : sheet.panel_textiles) cap(panel.textile);
 }
 
+SheetDefinition capped(const Scene& scene, std::size_t sheet) {
+  SheetDefinition definition = scene.sheets[sheet];
+  if (const auto& strain = scene.solver.max_self_weight_strain)
+    cap_stretch(definition, scene.environment, *strain);
+  return definition;
+}
+
 }  // namespace weft

@@ -17,4 +17,7 @@ SelfWeightStrain self_weight_strain(const SheetDefinition& sheet, const Environm
 // that follows the stiffness follows it here too.
 void cap_stretch(SheetDefinition& sheet, const Environment& environment, double strain);
 
+// A sheet of the scene as it is simulated, but for its damping: capped where the scene asks for it.
+SheetDefinition capped(const Scene& scene, std::size_t sheet);
+
 }  // namespace weft

@@ -64,6 +64,8 @@ grpc::Status FrameCall::take(const FoundSession& found, const std::string& uid,
   for (auto& problem : find_problems(order_.format, particles)) {
     problems.push_back(std::move(problem));
   }
+  if (order_.format.clearance() && session_->scene().colliders.empty())
+    problems.push_back({"format.clearance", "the scene has no collider"});
   if (!problems.empty()) return errors::field_invalid(problems);
   order_.format = with_defaults(order_.format);
   for (const auto& sheet : session_->scene().sheets) order_.sheets.push_back(sheet.shape);

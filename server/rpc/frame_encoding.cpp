@@ -3,6 +3,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <memory>
@@ -36,11 +37,11 @@ Selection selection(const v1::FrameFormat& format, std::int64_t particles) {
   return {first, stride, (covered + stride - 1) / stride};
 }
 
-std::vector<double> selected(const std::vector<double>& values, const Selection& wanted) {
+// Of so many particles, in each plane.
+std::vector<double> selected(const std::vector<double>& values, std::int64_t particles,
+                             const Selection& wanted) {
   std::vector<double> result;
-  const auto particles = static_cast<std::int64_t>(values.size() / 3);
-  result.reserve(static_cast<std::size_t>(3 * wanted.count));
-  for (const std::int64_t plane : {std::int64_t{0}, particles, 2 * particles}) {
+  for (std::int64_t plane = 0; plane < std::ssize(values); plane += particles) {
     for (std::int64_t i = 0; i < wanted.count; ++i)
       result.push_back(values[static_cast<std::size_t>(plane + wanted.first + i * wanted.stride)]);
   }
@@ -68,12 +69,13 @@ std::string byte_planes(const std::vector<std::uint64_t>& numbers) {
 
 // Differences of neighbours on the grid; small ones of either sign are small numbers. The guard
 // keeps every value below 1e9, so that no sum leaves 64 bits.
-std::vector<std::uint64_t> quantized(const std::vector<double>& values, double step) {
+std::vector<std::uint64_t> quantized(const std::vector<double>& values, std::size_t planes,
+                                     double step) {
   std::vector<std::uint64_t> numbers(values.size());
-  const std::size_t particles = values.size() / 3;
-  for (std::size_t first = 0; first < values.size(); first += particles) {
+  const std::size_t count = values.size() / planes;
+  for (std::size_t first = 0; first < values.size(); first += count) {
     std::int64_t before = 0;
-    for (std::size_t i = first; i < first + particles; ++i) {
+    for (std::size_t i = first; i < first + count; ++i) {
       const double steps = values[i] / step;
       const auto nearest = static_cast<std::int64_t>(steps + std::copysign(0.5, steps));
       const std::int64_t difference = nearest - std::exchange(before, nearest);
@@ -93,62 +95,74 @@ std::string compressed(const std::string& bytes) {
   return result;
 }
 
-std::string bytes_of(const std::vector<double>& values, const v1::FrameFormat& format) {
-  switch (format.encoding()) {
+// step: of what is QUANTIZED_ZSTD.
+std::string bytes_of(const std::vector<double>& values, std::size_t planes,
+                     v1::FrameEncoding encoding, double step) {
+  switch (encoding) {
     case v1::FRAME_ENCODING_FLOAT64:
       return planes_of<double>(values);
     case v1::FRAME_ENCODING_QUANTIZED_ZSTD:
-      return compressed(byte_planes(quantized(values, format.grid_step_m())));
+      return compressed(byte_planes(quantized(values, planes, step)));
     default:
       return planes_of<float>(values);
   }
 }
 
-std::string array_of(const std::vector<double>& values, const v1::FrameFormat& format) {
-  const auto particles = static_cast<std::int64_t>(values.size() / 3);
-  const Selection wanted = selection(format, particles);
-  return wanted.count == particles ? bytes_of(values, format)
-                                   : bytes_of(selected(values, wanted), format);
-}
+constexpr double kPressureSteps = 1000;  // of the grid step in m, each of 1 Pa
+
+// The values of a frame's particles that are asked for: planes of them, one after the other.
+class ParticleArrays {
+ public:
+  ParticleArrays(const v1::FrameFormat& format, std::int64_t particles)
+      : format_(format), particles_(particles), wanted_(selection(format, particles)) {}
+
+  std::string bytes(const std::vector<double>& values, double scale = 1) const {
+    const auto planes = values.size() / static_cast<std::size_t>(particles_);
+    const double step = scale * format_.grid_step_m();
+    return bytes_of(wanted_.count == particles_ ? values : selected(values, particles_, wanted_),
+                    planes, format_.encoding(), step);
+  }
+
+ private:
+  const v1::FrameFormat& format_;
+  std::int64_t particles_;
+  Selection wanted_;
+};
 
 // Their arrays, joined, are the frame's.
 std::vector<v1::Frame> in_parts(v1::Frame frame, std::int64_t most_bytes) {
   constexpr std::size_t kRest = 256;  // number, time, stats, tags and lengths
   const auto room = static_cast<std::size_t>(most_bytes) - kRest;
-  std::vector<v1::Frame> parts;
-  if (frame.positions_m().size() + frame.velocities_m_per_s().size() + frame.normals().size() +
-          frame.strain().size() <=
-      room) {
-    parts.push_back(std::move(frame));
+  using Array = std::string* (v1::Frame::*)();
+  constexpr std::array<Array, 6> kArrays{
+      &v1::Frame::mutable_positions_m, &v1::Frame::mutable_velocities_m_per_s,
+      &v1::Frame::mutable_normals,     &v1::Frame::mutable_strain,
+      &v1::Frame::mutable_pressure_pa, &v1::Frame::mutable_clearance_m};
+  std::array<std::string, kArrays.size()> arrays;
+  std::size_t bytes = 0;
+  for (std::size_t k = 0; k < arrays.size(); ++k) {
+    arrays[k].swap(*(frame.*kArrays[k])());
+    bytes += arrays[k].size();
+  }
+  std::vector<v1::Frame> parts{frame};
+  if (bytes <= room) {
+    for (std::size_t k = 0; k < arrays.size(); ++k) (parts[0].*kArrays[k])()->swap(arrays[k]);
     return parts;
   }
-  const std::string positions = std::move(*frame.mutable_positions_m());
-  const std::string velocities = std::move(*frame.mutable_velocities_m_per_s());
-  const std::string normals = std::move(*frame.mutable_normals());
-  frame.clear_positions_m();
-  frame.clear_velocities_m_per_s();
-  const std::string strain = std::move(*frame.mutable_strain());
-  frame.clear_normals();
-  frame.clear_strain();
-  parts.push_back(frame);
   std::size_t left = room;
-  const auto append = [&](const std::string& array, auto field) {
-    for (std::size_t from = 0; from < array.size();) {
+  for (std::size_t k = 0; k < arrays.size(); ++k) {
+    for (std::size_t from = 0; from < arrays[k].size();) {
       if (left == 0) {
         parts.back().set_continued(true);
         parts.push_back(frame);
         left = room;
       }
-      const std::size_t count = std::min(left, array.size() - from);
-      (parts.back().*field)()->assign(array, from, count);
+      const std::size_t count = std::min(left, arrays[k].size() - from);
+      (parts.back().*kArrays[k])()->assign(arrays[k], from, count);
       from += count;
       left -= count;
     }
-  };
-  append(positions, &v1::Frame::mutable_positions_m);
-  append(velocities, &v1::Frame::mutable_velocities_m_per_s);
-  append(normals, &v1::Frame::mutable_normals);
-  append(strain, &v1::Frame::mutable_strain);
+  }
   return parts;
 }
 
@@ -197,12 +211,23 @@ std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order) {
   v1::Frame message;
   message.set_number(frame.number);
   message.set_time_s(frame.time);
-  message.set_positions_m(array_of(frame.positions, format));
-  if (format.velocities()) message.set_velocities_m_per_s(array_of(frame.velocities, format));
+  const ParticleArrays arrays(format, std::ssize(frame.positions) / 3);
+  message.set_positions_m(arrays.bytes(frame.positions));
+  if (format.velocities()) message.set_velocities_m_per_s(arrays.bytes(frame.velocities));
   if (format.normals())
-    message.set_normals(array_of(normals_of(frame.positions, order.sheets), format));
+    message.set_normals(arrays.bytes(normals_of(frame.positions, order.sheets)));
   if (format.strain())
-    message.set_strain(bytes_of(strains_of(frame.positions, order.sheets), format));
+    message.set_strain(bytes_of(strains_of(frame.positions, order.sheets), 3, format.encoding(),
+                                format.grid_step_m()));
+  if (format.pressure())
+    message.set_pressure_pa(
+        arrays.bytes(frame.meter ? frame.meter->pressures(frame.scene, frame.positions, frame.time)
+                                 : frame.pressures,
+                     kPressureSteps));
+  if (format.clearance())
+    message.set_clearance_m(
+        arrays.bytes(frame.meter ? frame.meter->clearances(frame.scene, frame.positions, frame.time)
+                                 : frame.clearances));
   if (format.stats()) {
     v1::FrameStats* stats = message.mutable_stats();
     stats->set_kinetic_energy_j(frame.stats.kinetic_energy);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/contact_values.h"
 #include "core/simulation.h"
 #include "server/session/history_budget.h"
 
@@ -48,6 +49,12 @@ struct Frame {
   std::int64_t substeps = 0;    // since the frame before
   double substep = 0;           // s
   std::vector<Repair> repairs;  // that it took
+  // What pressures and clearances are read with: the scene as it was, and what reads them. Where
+  // there is none they are those below, or were not recorded.
+  std::shared_ptr<const Scene> scene;
+  std::shared_ptr<ContactMeter> meter;
+  std::vector<double> pressures;   // (particles) Pa
+  std::vector<double> clearances;  // (particles) m
   EncodingCache encodings;
 
   std::size_t bytes() const {  // without encodings

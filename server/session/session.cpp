@@ -236,7 +236,7 @@ std::optional<Clock::time_point> Session::next_due() {
   const auto since = idle_since();
   if (!since) return std::nullopt;
   if (Clock::now() < *since + kUnpackedTime) return *since + kUnpackedTime;
-  timeline_.simulation.release_memory();
+  timeline_.release_memory();
   return std::nullopt;
 }
 

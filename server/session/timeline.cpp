@@ -10,7 +10,9 @@
 namespace weft {
 
 Timeline::Timeline(Simulation given, std::int64_t max_frame_work, Duration snapshot_after)
-    : simulation(std::move(given)), snapshot_after_(snapshot_after) {
+    : simulation(std::move(given)),
+      snapshot_after_(snapshot_after),
+      meter_(std::make_shared<ContactMeter>(simulation.scene())) {
   if (max_frame_work > 0) simulation.limit_frame_work(max_frame_work);
 }
 
@@ -74,7 +76,14 @@ std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs) c
   frame->substeps = simulation.substeps();
   frame->substep = simulation.plan().step.substep;
   frame->repairs = std::move(repairs);
+  frame->scene = simulation.scene_of_frame();
+  frame->meter = meter_;
   return frame;
+}
+
+void Timeline::release_memory() {
+  simulation.release_memory();
+  meter_->release_memory();
 }
 
 std::vector<Repair> Timeline::repairs_of_frame() const {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/contact_values.h"
 #include "core/simulation.h"
 #include "server/session/command.h"
 #include "server/session/frame.h"
@@ -35,6 +36,9 @@ class Timeline {
   // Those of the present frame.
   std::vector<Repair> repairs_of_frame() const;
 
+  // What is not needed for a while without frames.
+  void release_memory();
+
   // Whether a restart would compute, or repeat, so much that a snapshot is due.
   bool snapshot_due() const;
   bool log_grew() const;
@@ -50,6 +54,7 @@ class Timeline {
   std::int64_t entries_in_snapshot_ = 0;  // the last one
   Duration computing_{};                  // of all frames
   std::int64_t substeps_ = 0;             // of all frames
+  std::shared_ptr<ContactMeter> meter_;   // of all frames
 };
 
 }  // namespace weft

@@ -1,8 +1,11 @@
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <sstream>
 
 #include "client/garments/pattern_file.h"
+#include "client/recording/points.h"
+#include "client/recording/reader.h"
 #include "tests/client/client_test.h"
 
 namespace weft::testing {
@@ -89,7 +92,15 @@ TEST_F(Drape, OfWhatFitsIsGoodAndIsWritten) {
   // around a polygon that keeps a skin of 3 mm from the pole
   const double girth = 2 * std::numbers::pi * (kPole + 0.003);
   EXPECT_NEAR(verdict["strain_weft"].get<double>(), girth / 0.62 - 1, 0.02);
-  EXPECT_GT(verdict["largest_pressure_pa"].get<double>(), 0);
+  client::RecordingReader recording(path("tube.weft"));
+  const auto pressures =
+      client::read_pressures(recording.read(recording.last_frame()), recording.header());
+  const auto largest = verdict["largest_pressure_pa"].get<double>();
+  EXPECT_GT(largest, 0);
+  EXPECT_NEAR(*std::max_element(pressures.begin(), pressures.end()), largest, 1e-6 * largest);
+  ASSERT_TRUE(recording.verdict());
+  EXPECT_TRUE(recording.verdict()->good());
+  EXPECT_THAT(run_weft({"info", path("tube.weft")}).out, HasSubstr("verdict           good"));
   for (const char* file : {"tube.glb", "tube.html", "tube.weft"})
     EXPECT_TRUE(std::filesystem::exists(path(file))) << file;
 }

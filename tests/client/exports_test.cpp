@@ -6,6 +6,7 @@
 #include <pugixml.hpp>
 #include <sstream>
 
+#include "client/recording/points.h"
 #include "client/recording/reader.h"
 #include "client/recording/writer.h"
 #include "tests/client/client_test.h"
@@ -338,6 +339,53 @@ TEST_F(ExportsTest, GltfIsAnAnimationFromFrameToFrame) {
     }
     for (std::size_t i = 0; i < shown.size(); ++i)
       ASSERT_NEAR(shown[i], recorded(static_cast<std::int64_t>(4 * k), i % 3, i / 3), 1e-6);
+  }
+}
+
+TEST_F(ExportsTest, PressureAndClearanceGoWithTheFramesOfEachSheet) {
+  v1::Scene scene = two_sheets();
+  scene.mutable_sheets(1)->clear_pins();
+  scene.add_colliders()->mutable_plane()->mutable_point_m()->set_y(-0.2);
+  service_.create(scene, "table");
+  ask({"record", "table", "--run", "--to", "30", "--pressure", "--clearance", "-o",
+       path("table.weft")});
+  client::RecordingReader recording(path("table.weft"));
+  const v1::Frame last = recording.read(30);
+  const auto pressures = client::read_pressures(last, recording.header()),
+             clearances = client::read_clearances(last, recording.header());
+  ASSERT_EQ(pressures.size(), kParticles);
+  EXPECT_GT(*std::max_element(pressures.begin(), pressures.end()), 1);
+
+  ask({"export", path("table.weft"), "-f", "csv", "--sheet", "right", "-o", path("table.csv")});
+  std::string heading;
+  const auto rows = read_csv(read_file(path("table.csv")), heading);
+  EXPECT_THAT(heading, HasSubstr(",z17,pressure0,pressure1,"));
+  EXPECT_THAT(heading,
+              ::testing::EndsWith(",pressure17,clearance0,clearance1,clearance2,clearance3,"
+                                  "clearance4,clearance5,clearance6,clearance7,"
+                                  "clearance8,clearance9,clearance10,clearance11,"
+                                  "clearance12,clearance13,clearance14,clearance15,"
+                                  "clearance16,clearance17"));
+  ask({"export", path("table.weft"), "-f", "vtk", "--frames", "30:", "-o", path("table.pvd")});
+  const std::string mesh = read_file(path("table/frame_000030.vtp"));
+  EXPECT_EQ(vtk_array<double>(mesh, "Name=\"pressure\""), pressures);
+  EXPECT_EQ(vtk_array<double>(mesh, "Name=\"clearance\""), clearances);
+  ask({"export", path("table.weft"), "-f", "gltf", "--frames", "30:", "-o", path("table.glb")});
+  const Gltf gltf(read_file(path("table.glb")));
+  const nlohmann::json& attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"];
+  const auto attribute = gltf.array<float>(attributes["_PRESSURE"]);
+  ask({"export", path("table.weft"), "-f", "npz", "-o", path("table.npz")});
+  const std::string zip = read_file(path("table.npz"));
+  const std::size_t file = zip.find("clearance.npy"), header = zip.find("\x93NUMPY", file);
+  EXPECT_THAT(zip.substr(header, 128), HasSubstr("(31,38,)"));
+  const std::size_t numbers = header + 10 + number_at<std::uint16_t>(zip, header + 8);
+  for (std::size_t i = 0; i < kParticles; ++i) {
+    EXPECT_EQ(attribute[i], static_cast<float>(pressures[i]));
+    EXPECT_EQ(number_at<float>(zip, numbers + 4 * (30 * kParticles + i)),
+              static_cast<float>(clearances[i]));
+    if (i < 20) continue;
+    EXPECT_NEAR(rows[30][1 + 3 * 18 + i - 20], pressures[i], 1e-6 * pressures[i]);
+    EXPECT_NEAR(rows[30][1 + 4 * 18 + i - 20], clearances[i], 1e-9);
   }
 }
 

@@ -1,5 +1,7 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <pugixml.hpp>
@@ -203,6 +205,33 @@ TEST_F(PageTest, APlotHasCurvesOfEnergyStrainSpeedAndSubsteps) {
   }
   EXPECT_EQ(curves, (std::vector<std::size_t>{4, 2, 2, 2}));
   EXPECT_THAT(points, Each(::testing::AnyOf(kEnd, kEnd + 1)));
+}
+
+TEST_F(PageTest, HoldsWhatWasRecordedBesidePositionsInLevels) {
+  ask({"record", "fallen", "--from", "0", "--to", std::to_string(kEnd), "--pressure", "--clearance",
+       "-o", fallen_, "--force"});
+  ask({"view", fallen_, "-o", page_});
+  const std::string page = read_file(page_);
+  const nlohmann::json kinds = description(page)["recordings"][0]["values"];
+  std::string bytes = inflated(page, "values-0");
+  ASSERT_EQ(bytes.size(), 2 * 20 * (kEnd + 1));
+  const nlohmann::json& kind = kinds["clearance"];  // after pressure
+  const auto low = kind["low"].get<double>(), high = kind["high"].get<double>();
+  client::RecordingReader recording(fallen_);
+  std::array<unsigned char, 20> level{};
+  for (std::int64_t frame = 0; frame <= kEnd; ++frame) {
+    const auto wanted = client::read_clearances(recording.read(frame), recording.header());
+    for (std::size_t i = 0; i < 20; ++i) {
+      level[i] = static_cast<unsigned char>(
+          level[i] + static_cast<unsigned char>(
+                         bytes[20 * (kEnd + 1) + static_cast<std::size_t>(frame) * 20 + i]));
+      const double share = level[i] / kind["most"].get<double>();
+      EXPECT_NEAR(low + (high - low) * share * share, std::min(wanted[i], high),
+                  (high - low) / 255);
+    }
+  }
+  EXPECT_GT(high, 2);  // m, where it starts
+  EXPECT_EQ(kinds["pressure"]["high"], 0);
 }
 
 }  // namespace

@@ -53,6 +53,36 @@ TEST_F(ReplayTest, ARecordingOfAReplayHasTheBitsOfTheOriginal) {
   }
 }
 
+TEST_F(ReplayTest, PressureAndClearanceAreThoseThatWereRecorded) {
+  v1::Scene scene = small_scene();
+  scene.add_colliders()->mutable_sphere()->set_radius_m(0.05);
+  service_.create(scene, "ball");
+  const std::vector<std::string> both{"--pressure", "--clearance", "--encoding", "float64"};
+  const auto recorded = [&](std::vector<std::string> command) {
+    command.insert(command.end(), both.begin(), both.end());
+    return command;
+  };
+  ask(recorded({"record", "ball", "--run", "--to", "20", "-o", file_}));
+  replay();
+  const std::string copy = path("copy.weft");
+  const Outcome outcome =
+      ask_replay(recorded({"record", "ball", "--run", "--to", "20", "-o", copy}));
+  ASSERT_EQ(outcome.exit, 0) << outcome.err;
+  client::RecordingReader one(file_), other(copy);
+  for (const std::int64_t frame : {0, 20}) {
+    EXPECT_EQ(other.read(frame).pressure_pa(), one.read(frame).pressure_pa());
+    EXPECT_EQ(other.read(frame).clearance_m(), one.read(frame).clearance_m());
+    EXPECT_EQ(one.read(frame).clearance_m().size(), 20 * sizeof(double));
+  }
+  EXPECT_THAT(run_weft({"info", copy}).out, HasSubstr("positions, pressure, clearance, float64"));
+
+  ask({"record", "ball", "--from", "0", "--to", "20", "-o", file_, "--force"});
+  replay();
+  const Outcome refused = ask_replay(recorded({"record", "ball", "-o", path("no.weft")}));
+  EXPECT_EQ(refused.exit, 1);
+  EXPECT_THAT(refused.err, HasSubstr("was not recorded; weft record --pressure does"));
+}
+
 TEST_F(ReplayTest, FramesComeAtTheirTimeAndStay) {
   record();
   replay(1000);

@@ -33,6 +33,7 @@ StreamHeader some_header(FuzzedDataProvider& input) {
   header.mutable_format()->set_grid_step_m(is_wild(input) ? input.ConsumeFloatingPoint<double>()
                                                           : 1e-4);
   header.mutable_format()->set_velocities(input.ConsumeBool());
+  header.mutable_format()->set_pressure(input.ConsumeBool());
   std::uint32_t particles = 0;
   for (int sheets = input.ConsumeIntegralInRange(0, 3); sheets > 0; --sheets) {
     auto* sheet = header.add_sheets();
@@ -47,11 +48,12 @@ StreamHeader some_header(FuzzedDataProvider& input) {
   return header;
 }
 
-std::string some_array(FuzzedDataProvider& input, const StreamHeader& header) {
+std::string some_array(FuzzedDataProvider& input, const StreamHeader& header,
+                       std::size_t planes = 3) {
   std::size_t values = 0;
   for (const auto& sheet : header.sheets())
-    values +=
-        3 * static_cast<std::uint16_t>(sheet.rows()) * static_cast<std::uint16_t>(sheet.columns());
+    values += planes * static_cast<std::uint16_t>(sheet.rows()) *
+              static_cast<std::uint16_t>(sheet.columns());
   const bool doubles = header.format().encoding() == weft::v1::FRAME_ENCODING_FLOAT64;
   std::string bytes = input.ConsumeRandomLengthString();
   if (!is_wild(input)) bytes.resize(std::min<std::size_t>(values, 1000) * (doubles ? 8 : 4));
@@ -79,6 +81,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       frame.set_time_s(is_wild(input) ? input.ConsumeFloatingPoint<double>() : count / 60.0);
       frame.set_positions_m(some_array(input, header));
       if (header.format().velocities()) frame.set_velocities_m_per_s(some_array(input, header));
+      if (header.format().pressure()) frame.set_pressure_pa(some_array(input, header, 1));
       writer.add(frame);
     }
   }

@@ -11,6 +11,7 @@ let address;
 let url;
 let weftd;
 let served;
+let dressed;  // session of a garment at rest
 const weft = (...words) => run(...words, '--server', address);
 const scene = (session) => JSON.parse(weft('session', 'get', session, '--json')).scene;
 
@@ -48,6 +49,7 @@ before(async () => {
   }
   writeFileSync(file('sewn.json'), JSON.stringify(sewn()));
   weft('session', 'create', file('sewn.json'), '--id', 'sewn');
+  dressed = JSON.parse(weft('drape', 'tshirt', '--size', '40', '--edge', '0.03', '--json')).session.split('/')[1];
   mkdirSync(file('recordings'));
   await serve('0');
 });
@@ -160,7 +162,6 @@ test('a cloth of triangles is shown by its panels and led by any particle', asyn
   await play(page);
   await pass(page, 20);
   await page.locator('#colour').selectOption('panels');
-  await page.keyboard.press('l');
   const {x, y, width, height} = await page.locator('#view').boundingBox();
   await page.mouse.move(x + 0.6 * width, y + 0.45 * height);
   await page.mouse.down();
@@ -175,6 +176,49 @@ test('a cloth of triangles is shown by its panels and led by any particle', asyn
   await says(page, 'least', /^−[\d.]+ %$/);
   await pause(page);
   await picture(page, 'serve-sewn-weft');
+  await close();
+});
+
+test('a garment is shown with what presses it, and is judged', async () => {
+  const {page, close} = await open(dressed);
+  await says(page, 'names', /paused, at rest/);
+  await page.locator('#colour').selectOption('pressure');
+  await says(page, 'most', /^0\.\d+ kPa or more$/);
+  const most = parseFloat(await page.textContent('#most'));
+  assert.ok(most > 0.01 && most < 1, `${most} kPa`);
+  await picture(page, 'serve-pressure');
+  await page.locator('#colour').selectOption('clearance');
+  await says(page, 'most', /^[1-9]\d mm or more$/);
+  await page.getByRole('button', {name: 'Pattern'}).click();
+  await page.getByRole('button', {name: 'Judge'}).click();
+  await says(page, 'verdicts', /Good drape.*Frame \d+.*in the body.*nothing/);
+  await settle(page);
+  await picture(page, 'serve-clearance');
+  await page.locator('#colour').selectOption('cloth');
+  await play(page);
+  await pass(page, 5);
+  await pause(page);
+  await close();
+});
+
+test('a garment takes another fabric, and is led from its pattern or by the cloth itself', async () => {
+  const {page, close} = await open(dressed, {colorScheme: 'dark'});
+  await page.locator('#preset').selectOption('textiles/denim_11oz');
+  await says(page, 'applied', /: from frame \d+ on/);
+  await page.locator('#colour').selectOption('warp');
+  await play(page);
+  await pass(page, 5);
+  const {x, y, width, height} = await page.locator('#view').boundingBox();
+  await page.mouse.move(x + width / 2, y + 0.7 * height);
+  await page.mouse.down();
+  await says(page, 'doing', /Leads particle \d+ from frame \d+ on/);
+  await page.mouse.move(x + 0.75 * width, y + 0.6 * height, {steps: 10});
+  await pass(page, 20);
+  await picture(page, 'serve-garment');
+  await page.mouse.up();
+  await says(page, 'doing', /Let go/);
+  await pass(page, 5);
+  await pause(page);
   await close();
 });
 

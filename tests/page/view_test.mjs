@@ -17,6 +17,7 @@ before(() => {
   writeFileSync(file('sewn.json'), JSON.stringify(sewn()));
   weft('record', file('sewn.json'), '--embedded', '--to', '60', '-o', file('sewn.weft'));
   weft('view', file('sewn.weft'), '-o', file('sewn.html'));
+  weft('drape', 'tshirt', '--size', '40', '--edge', '0.03', '--page', file('shirt.html'), '--recording', file('shirt.weft'));
 });
 
 // The page from disk, without a network, standing at its first frame.
@@ -83,7 +84,8 @@ test('dragging turns the view, and F fits it again', async () => {
   await settle(page);
   assert.notEqual(await canvas(page), fitted);
   await page.keyboard.press('f');
-  await page.evaluate(() => document.activeElement.blur());  // takes away the ring around it
+  await page.mouse.move(5, 5);  // takes away what it points at
+  await page.evaluate(() => document.activeElement.blur());  // and the ring around it
   await settle(page);
   assert.equal(await canvas(page), fitted);
   await close();
@@ -230,16 +232,19 @@ test('who cannot see it hears what is shown, and reaches everything by keys', as
     await page.keyboard.press('Tab');
     reached.add(await page.evaluate(() => document.activeElement.id));
   }
-  for (const id of ['view', 'colour', 'lines', 'turntable', 'picture', 'facts-button', 'play', 'scrub', 'speed', 'repeat']) {
+  for (const id of ['view', 'colour', 'pattern', 'layers-button', 'turntable', 'picture', 'facts-button', 'play', 'scrub', 'speed', 'repeat']) {
     assert.ok(reached.has(id), id);
   }
   await close();
 });
 
 test('no rule of accessibility is broken, in light and dark, wide and narrow', async () => {
-  for (const options of [{}, {colorScheme: 'dark'}, {viewport: {width: 390, height: 844}}]) {
-    const {page, close} = await open('pair.html', options);
+  const narrow = {viewport: {width: 390, height: 844}};
+  for (const [name, options] of ['pair', 'shirt'].flatMap((each) => [{}, {colorScheme: 'dark'}, narrow].map((option) => [each, option]))) {
+    const {page, close} = await open(`${name}.html`, options);
     await page.locator('#colour').selectOption('strain');
+    await page.keyboard.press('u');
+    await page.locator('#layers-button').click();
     await settle(page);
     await page.addScriptTag({content: readFileSync(fileURLToPath(import.meta.resolve('axe-core')), 'utf8')});
     const {violations} = await page.evaluate(() => axe.run());
@@ -261,10 +266,15 @@ test('a cloth of triangles is shown with its panels, in light and dark', async (
   await picture(page, 'sewn');
   const cloth = await canvas(page);
   await page.locator('#colour').selectOption('panels');
-  await page.keyboard.press('l');
   await settle(page);
   assert.deepEqual(await page.locator('#panels li').allTextContents(), ['left', 'right']);
-  assert.notEqual(await canvas(page), cloth);
+  const panels = await canvas(page);
+  assert.notEqual(panels, cloth);
+  await page.keyboard.press('l');
+  await settle(page);
+  assert.notEqual(await canvas(page), panels);  // without seams
+  await page.keyboard.press('l');
+  await settle(page);
   await picture(page, 'sewn-panels');
   await page.getByRole('button', {name: 'Theme'}).click();
   await settle(page);
@@ -302,4 +312,152 @@ test('on a phone the panels of a cloth fit the width', async () => {
   assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
   await picture(page, 'sewn-phone');
   await close();
+});
+
+// Columns of the pixels of a colour that the view shows.
+const columnsOf = async (page, colour) => {
+  const png = (await page.locator('#view').screenshot()).toString('base64');
+  return page.evaluate(async ([data, wanted]) => {
+    const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], {type: 'image/png'}));
+    const drawing = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    drawing.drawImage(image, 0, 0);
+    const {data: pixels} = drawing.getImageData(0, 0, image.width, image.height);
+    return Array.from({length: image.width * image.height}, (_, i) => i)
+      .filter((i) => wanted.every((part, k) => Math.abs(pixels[4 * i + k] - part) < 12)).map((i) => i % image.width);
+  }, [png, colour]);
+};
+
+test('a dressed garment is shown with its verdict, phases, and what presses it', async () => {
+  const {page, close} = await open('shirt.html');
+  const verdict = plain(await page.textContent('#verdicts'));
+  assert.match(verdict, /Good drape.*at restyes.*cuts of clothnone.*in the bodynothing.*pressureup to [0-9.]+ kPa/);
+  assert.deepEqual(await page.locator('#phases span').allTextContents().then((all) => all.map(plain)),
+    ['seams close', 'weight comes in', 'comes to rest']);
+  const current = () => page.locator('#phases [aria-current=true]').textContent().then(plain);
+  assert.equal(await current(), 'seams close');
+  await page.keyboard.press('End');
+  await settle(page);
+  assert.equal(await current(), 'comes to rest');
+  await picture(page, 'shirt');
+
+  const said = JSON.parse(weft('info', file('shirt.weft'), '--json')).header.format;
+  assert.deepEqual([said.pressure, said.clearance], [true, true]);
+  for (const [colour, unit] of [['pressure', 'kPa'], ['clearance', 'mm'], ['weft', '%']]) {
+    await page.locator('#colour').selectOption(colour);
+    await settle(page);
+    assert.match(plain(await page.textContent('#most')), new RegExp(`^[\\d.]+ ${unit}`));
+    await picture(page, `shirt-${colour}`);
+  }
+  // once its seams are closed no strain is as large as while they close
+  assert.ok(parseFloat(await page.textContent('#most')) < 100);
+  await close();
+});
+
+test('a recording keeps its verdict, which is shown with its frame, and what was not recorded cannot be chosen', async () => {
+  weft('view', file('shirt.weft'), '--frames', '9:', '-o', file('late.html'));
+  const late = await open('late.html');
+  assert.match(plain(await late.page.textContent('#verdicts')), /Good drape/);
+  await late.close();
+  weft('view', file('shirt.weft'), '--frames', '0:9', '-o', file('early.html'));
+  const early = await open('early.html');
+  assert.equal(await early.page.locator('#verdicts section').count(), 0);
+  await early.close();
+  const {page, close} = await open('sewn.html');
+  assert.equal(await page.locator('#phases').isVisible(), false);
+  for (const colour of ['pressure', 'clearance']) {
+    assert.equal(await page.locator(`#colour [value=${colour}]`).evaluate(({disabled}) => disabled), true);
+  }
+  await close();
+});
+
+test('a point is marked on the cloth and on its pattern, with its panel and value', async () => {
+  const {page, close} = await open('shirt.html');
+  await page.keyboard.press('End');
+  await page.getByRole('button', {name: 'Pattern'}).click();
+  await page.locator('#colour').selectOption('clearance');
+  await settle(page);
+  assert.deepEqual((await page.locator('#cut span').allTextContents()).slice(0, 2), ['front', 'back']);
+  const {x, y, width, height} = await page.locator('#view').boundingBox();
+  const front = await page.locator('#cut span').first().boundingBox();
+  await page.mouse.move(front.x + front.width / 2, front.y + 40);
+  await settle(page);
+  assert.match(plain(await page.textContent('#probe')), /^front [\d.]+ mm$/);
+  const marks = await columnsOf(page, [31, 95, 191]);  // in the accent of the page
+  assert.ok(marks.some((at) => at < 0.5 * width) && marks.some((at) => at > 0.55 * width), `${marks.length} pixels`);
+  await picture(page, 'shirt-pattern');
+
+  // and from the cloth to the pattern: the same panel
+  await page.mouse.move(x + 0.25 * width, y + 0.55 * height);
+  await settle(page);
+  assert.match(plain(await page.textContent('#probe')), /^front [\d.]+ mm$/);
+  await page.mouse.move(x + 0.02 * width, y + 0.1 * height);
+  await settle(page);
+  assert.equal(await page.locator('#probe').isVisible(), false);
+  await close();
+});
+
+test('one of two sheets is hidden, in space and on the pattern', async () => {
+  const {sheets: [sheet], ...scene} = sewn();
+  const over = {...sheet, name: 'over', placement: {origin_m: {...sheet.placement.origin_m, y: 0.3}}};
+  writeFileSync(file('layers.json'), JSON.stringify({...scene, sheets: [sheet, over]}));
+  weft('record', file('layers.json'), '--embedded', '--to', '5', '-o', file('layers.weft'));
+  weft('view', file('layers.weft'), '-o', file('layers.html'));
+  const {page, close} = await open('layers.html');
+  await page.keyboard.press('u');
+  await page.locator('#colour').selectOption('panels');
+  await settle(page);
+  assert.deepEqual((await page.locator('#cut span').allTextContents()).map(plain),
+    ['cloth left', 'cloth right', 'over left', 'over right']);
+  const both = await canvas(page);
+  await picture(page, 'layers');
+  await page.locator('#layers-button').click();
+  await page.getByLabel('over').uncheck();
+  await page.keyboard.press('Escape');
+  await settle(page);
+  const one = await canvas(page);
+  assert.notEqual(one, both);
+  await picture(page, 'layers-one');
+  await page.locator('#layers-button').click();
+  await page.getByLabel('over').check();
+  await page.getByLabel('cloth').uncheck();
+  await page.keyboard.press('Escape');
+  await settle(page);
+  assert.notEqual(await canvas(page), one);
+  await close();
+});
+
+test('bodies are shown or not', async () => {
+  const {page, close} = await open('shirt.html');
+  await page.keyboard.press('End');
+  await settle(page);
+  const both = await canvas(page);
+  await page.locator('#layers-button').click();
+  await page.getByLabel('bodies').uncheck();
+  await page.keyboard.press('Escape');
+  await settle(page);
+  assert.notEqual(await canvas(page), both);
+  await page.evaluate(() => document.activeElement.blur());
+  await page.keyboard.press('b');
+  await settle(page);
+  assert.equal(await canvas(page), both);
+  await close();
+});
+
+test('on a phone a garment and its pattern fit the width, and a tap names a panel', async () => {
+  for (const colorScheme of ['light', 'dark']) {
+    const {page, close} = await open('shirt.html', {viewport: {width: 390, height: 844}, hasTouch: true, deviceScaleFactor: 2, colorScheme});
+    await page.keyboard.press('End');
+    await page.keyboard.press('u');
+    await page.locator('#colour').selectOption('pressure');
+    await settle(page);
+    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
+    const back = await page.locator('#cut span').nth(1).boundingBox();
+    await page.touchscreen.tap(back.x + back.width / 2, back.y + 25);
+    await settle(page);
+    assert.match(plain(await page.textContent('#probe')), /^back [\d.]+ kPa$/);
+    await picture(page, `shirt-phone-${colorScheme}`);
+    await page.screenshot({path: join(process.env.PICTURES, `shirt-phone-whole-${colorScheme}.png`), fullPage: true});
+    await close();
+  }
 });

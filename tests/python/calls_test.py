@@ -204,8 +204,17 @@ class Plain(unittest.TestCase):
         np.testing.assert_array_equal(exact.sheet("sheet")[2, 3], exact.positions[2 * 9 + 3])
         self.assertGreater(exact.stats.largest_strain, 0)
 
+        ball = weft.Collider(weft.Sphere(0.1, center_m=(0, -1, 0)), name="ball")
+        near = self.server.create_session(weft.Scene(FALL.sheets, [ball]))
+        for encoding, within in ("FLOAT64", 1e-12), ("QUANTIZED_ZSTD", 1e-4):
+            frame = near.frame(0, encoding=encoding, pressure=True, clearance=True)
+            self.assertEqual(frame.pressure.shape, (len(frame.positions),))
+            away = np.linalg.norm(frame.positions - (0, -1, 0), axis=1) - 0.1
+            np.testing.assert_allclose(frame.clearance, away, rtol=0, atol=within)
+
         single = session.frame(30)
         self.assertIs(single.velocities, None)
+        self.assertIs(single.clearance, None)
         self.assertEqual(single.positions.dtype, np.float32)
         self.assertFalse(single.positions.flags.owndata)
         np.testing.assert_array_equal(single.positions, exact.positions.astype(np.float32))

@@ -14,6 +14,8 @@ std::shared_ptr<const Frame> frame_of_100() {
   auto frame = std::make_shared<Frame>();
   frame->positions.assign(300, 0.5);
   frame->velocities.assign(300, 0.25);
+  frame->pressures.assign(100, 1234.5);
+  frame->clearances.assign(100, -0.125);
   return frame;
 }
 
@@ -46,6 +48,8 @@ TEST(FrameEncoding, SendsNoMessageLargerThanItsBoundAndNoByteTwice) {
   FrameOrder order{.sheets = {Grid{.rows = 4, .columns = 25}}};
   order.format.set_velocities(true);
   order.format.set_normals(true);
+  order.format.set_pressure(true);
+  order.format.set_clearance(true);
   order.format.set_stats(true);
   for (const auto encoding : {v1::FRAME_ENCODING_FLOAT32, v1::FRAME_ENCODING_FLOAT64,
                               v1::FRAME_ENCODING_QUANTIZED_ZSTD}) {
@@ -65,12 +69,16 @@ TEST(FrameEncoding, SendsNoMessageLargerThanItsBoundAndNoByteTwice) {
         joined.mutable_positions_m()->append(part.positions_m());
         joined.mutable_velocities_m_per_s()->append(part.velocities_m_per_s());
         joined.mutable_normals()->append(part.normals());
+        joined.mutable_pressure_pa()->append(part.pressure_pa());
+        joined.mutable_clearance_m()->append(part.clearance_m());
         continued = part.continued();
       }
       EXPECT_FALSE(continued);
       EXPECT_EQ(joined.positions_m(), all[0].positions_m());
       EXPECT_EQ(joined.velocities_m_per_s(), all[0].velocities_m_per_s());
       EXPECT_EQ(joined.normals(), all[0].normals());
+      EXPECT_EQ(joined.pressure_pa(), all[0].pressure_pa());
+      EXPECT_EQ(joined.clearance_m(), all[0].clearance_m());
     }
   }
 }

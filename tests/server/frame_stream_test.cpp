@@ -1,4 +1,5 @@
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstring>
 #include <thread>
 
@@ -373,6 +374,82 @@ TEST(StreamFrames, SendsNormalsOfEachSheet) {
   expect_normal(7, 8, 6, 12, 2);
   expect_normal(20 + 8, 20 + 9, 20 + 7, 20 + 14, 20 + 2);
   expect_normal(20, 21, 20, 26, 20);  // a corner
+}
+
+// The second sheet lies on a table.
+v1::Scene on_a_table() {
+  v1::Scene scene = two_sheets();
+  scene.mutable_sheets(1)->clear_pins();
+  scene.mutable_sheets(1)->mutable_placement()->mutable_origin_m()->set_y(-0.2);
+  scene.add_colliders()->mutable_plane()->mutable_point_m()->set_y(-0.21);
+  return scene;
+}
+
+v1::StreamFramesRequest pressed(const v1::Session& session, std::int64_t frame) {
+  auto request = frames_of(session, frame, frame);
+  request.mutable_format()->set_pressure(true);
+  request.mutable_format()->set_clearance(true);
+  return request;
+}
+
+TEST(StreamFrames, SendsWhatCollidersPressWithAndHowFarTheyAre) {
+  Service service;
+  const v1::Session session = service.create(on_a_table());
+  service.step(session, 120);
+  auto request = pressed(session, 120);
+  const v1::Frame frame = Stream(service, request).frame();
+  const auto x = doubles(frame.positions_m()), pressure = doubles(frame.pressure_pa()),
+             clearance = doubles(frame.clearance_m());
+  ASSERT_THAT(pressure, SizeIs(44));
+  ASSERT_THAT(clearance, SizeIs(44));
+  for (std::size_t i = 0; i < 44; ++i) {
+    EXPECT_NEAR(clearance[i], x[44 + i] + 0.21, 1e-12);
+    if (i < 20) {
+      EXPECT_EQ(pressure[i], 0);
+    }
+  }
+  const std::size_t inner = 20 + 6 + 2;  // a cell's area is its own
+  EXPECT_NEAR(pressure[inner], 1e-3 * 9.80665 / (0.05 * 0.05), 0.01 * pressure[inner]);
+  v1::GetVerdictRequest ask;
+  ask.set_name(session.name());
+  v1::Verdict verdict;
+  ASSERT_TRUE(service.call(&Service::Sessions::GetVerdict, ask, &verdict).ok());
+  EXPECT_EQ(verdict.largest_pressure_pa(), *std::max_element(pressure.begin(), pressure.end()));
+
+  request.mutable_format()->set_first_particle(21);
+  request.mutable_format()->set_stride(2);
+  const v1::Frame some = Stream(service, request).frame();
+  ASSERT_THAT(doubles(some.clearance_m()), SizeIs(12));
+  EXPECT_EQ(doubles(some.clearance_m())[3], clearance[27]);
+  EXPECT_EQ(doubles(some.pressure_pa())[3], pressure[27]);
+}
+
+TEST(StreamFrames, OfEarlierFramesThePressureIsWhatItWasAndThatOfTheirTextile) {
+  Service service;
+  const v1::Session session = service.create(on_a_table());
+  service.step(session, 60);
+  const v1::Frame frame = Stream(service, pressed(session, 60)).frame();
+  v1::UpdateTextileRequest heavier;
+  heavier.set_name(session.name());
+  heavier.set_sheet("sheet-2");
+  *heavier.mutable_textile() = session.scene().sheets(1).textile();
+  heavier.mutable_textile()->mutable_raw()->set_particle_mass_kg(3e-3);
+  v1::UpdateTextileResponse updated;
+  ASSERT_TRUE(service.call(&Service::Sessions::UpdateTextile, heavier, &updated).ok());
+  service.step(session, 60);
+  auto request = pressed(session, 60);
+  request.mutable_format()->set_velocities(true);  // encoded anew
+  EXPECT_EQ(Stream(service, request).frame().pressure_pa(), frame.pressure_pa());
+  const auto pressure = [](const v1::Frame& of) { return doubles(of.pressure_pa())[32]; };
+  EXPECT_NEAR(pressure(Stream(service, pressed(session, 120)).frame()), 3 * pressure(frame),
+              0.1 * pressure(frame));
+}
+
+TEST(StreamFrames, RefusesClearanceWhereThereIsNoCollider) {
+  Service service;
+  const v1::Session session = service.create();
+  const Error error = Stream(service, pressed(session, 0)).finish();
+  EXPECT_THAT(error.fields(), ElementsAre("format.clearance"));
 }
 
 TEST(StreamFrames, RefusesMoreStreamsThanItsLimit) {

@@ -197,7 +197,7 @@ std::vector<std::string> known_requests(const std::string& type) {
        "session: 'sessions/it' start_frame: 0 end_frame: 0 format { encoding: "
        "FRAME_ENCODING_FLOAT64 "
        "velocities: true stats: true grid_step_m: 0.001 first_particle: 2 particle_count: 9 "
-       "stride: 2 } slow_reader: SLOW_READER_HOLD_SESSION"},
+       "stride: 2 pressure: true } slow_reader: SLOW_READER_HOLD_SESSION"},
       {"ViewFramesRequest",
        "session: 'sessions/it' format { encoding: FRAME_ENCODING_QUANTIZED_ZSTD velocities: true "
        "stats: true grid_step_m: 0.001 } credits: 2"},

@@ -341,12 +341,16 @@ class Session:
         velocities: bool = False,
         normals: bool = False,
         strain: bool = False,
+        pressure: bool = False,
+        clearance: bool = False,
         particles: range | None = None,
         grid_step_m: float | None = None,
         hold: bool = True,
         through_pauses: bool = False,
     ) -> AsyncGenerator[Frame, None]:
-        format = format_of(encoding, velocities, normals, strain, particles, grid_step_m)
+        format = format_of(
+            encoding, velocities, normals, strain, pressure, clearance, particles, grid_step_m
+        )
         begin = self._next if start is None else start
         request = calls.stream_request(self.name, begin, end, hold, format)
         return self._read(self._feed(request, through_pauses), start is None)
@@ -394,10 +398,14 @@ class Session:
         velocities: bool = False,
         normals: bool = False,
         strain: bool = False,
+        pressure: bool = False,
+        clearance: bool = False,
         particles: range | None = None,
         grid_step_m: float | None = None,
     ) -> AsyncGenerator[Frame, None]:
-        format = format_of(encoding, velocities, normals, strain, particles, grid_step_m)
+        format = format_of(
+            encoding, velocities, normals, strain, pressure, clearance, particles, grid_step_m
+        )
         view = View(self.server._link, calls.view_request(self.name, self.uid, format, credits))
         method = self.server._link.method(view.request)
         while True:

@@ -416,6 +416,8 @@ class Session:
         velocities: bool = False,
         normals: bool = False,
         strain: bool = False,
+        pressure: bool = False,
+        clearance: bool = False,
         particles: range | None = None,
         grid_step_m: float | None = None,
         hold: bool = True,
@@ -433,7 +435,9 @@ class Session:
         `particles` are those of the arrays, such as range(0, 961, 31). QUANTIZED_ZSTD rounds to
         multiples of grid_step_m, 1e-4 if None, and takes a third to a tenth on the way.
         """
-        format = format_of(encoding, velocities, normals, strain, particles, grid_step_m)
+        format = format_of(
+            encoding, velocities, normals, strain, pressure, clearance, particles, grid_step_m
+        )
         begin = self._next if start is None else start
         request = calls.stream_request(self.name, begin, end, hold, format)
         return self._read(self._feed(request, through_pauses), start is None)
@@ -482,12 +486,16 @@ class Session:
         velocities: bool = False,
         normals: bool = False,
         strain: bool = False,
+        pressure: bool = False,
+        clearance: bool = False,
         particles: range | None = None,
         grid_step_m: float | None = None,
     ) -> Generator[Frame, None, None]:
         """The newest frame, again and again, for those who look: what comes while one is drawn is
         skipped, and holds up nobody. More credits keep a stream busier, and frames older."""
-        format = format_of(encoding, velocities, normals, strain, particles, grid_step_m)
+        format = format_of(
+            encoding, velocities, normals, strain, pressure, clearance, particles, grid_step_m
+        )
         view = View(self.server._link, calls.view_request(self.name, self.uid, format, credits))
         method = self.server._link.method(view.request)
         while True:

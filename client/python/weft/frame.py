@@ -14,6 +14,7 @@ from .values import enum_number
 
 Array = npt.NDArray[Any]
 Encoding = Literal["FLOAT32", "FLOAT64", "QUANTIZED_ZSTD"]
+_ARRAYS = ("positions_m", "velocities_m_per_s", "normals", "strain", "pressure_pa", "clearance_m")
 _FLOATS = {frame_pb2.FRAME_ENCODING_FLOAT64: "<f8"}  # FLOAT32 else
 
 
@@ -26,6 +27,8 @@ class Frame:
     normals     (n, 3), of length 1, where asked for
     strain      (m, 3) of all triangles, along warp and weft and the sine of the shear angle,
                 where asked for
+    pressure    (n,), Pa, what colliders press with as of cloth at rest, where asked for
+    clearance   (n,), m from the nearest collider, negative inside, where asked for
     stats       weft.v1.FrameStats: energies, largest strain, substeps, whether it is at rest
     skipped     of a view: frames between the one before and this one
 
@@ -40,6 +43,8 @@ class Frame:
     velocities: Array | None
     normals: Array | None
     strain: Array | None
+    pressure: Array | None
+    clearance: Array | None
     stats: frame_pb2.FrameStats
     header: frame_pb2.StreamHeader
     skipped: int = 0
@@ -90,6 +95,8 @@ class Reader:
             self._array(message, message.velocities_m_per_s, self._particles),
             self._array(message, message.normals, self._particles),
             self._array(message, message.strain, self._triangles),
+            self._numbers(message, message.pressure_pa, 1000 * self._step),
+            self._numbers(message, message.clearance_m, self._step),
             message.stats,
             self.header,
             skipped,
@@ -97,22 +104,33 @@ class Reader:
 
     def _array(self, message: frame_pb2.Frame, data: bytes, count: int) -> Array | None:
         """Planes x, y, z on the wire as an (n, 3) view."""
+        planes = self._planes(message, data, 3, count, self._step)
+        return None if planes is None else planes.T
+
+    def _numbers(self, message: frame_pb2.Frame, data: bytes, step: float) -> Array | None:
+        """One of each particle."""
+        planes = self._planes(message, data, 1, self._particles, step)
+        return None if planes is None else planes[0]
+
+    def _planes(
+        self, message: frame_pb2.Frame, data: bytes, planes: int, count: int, step: float
+    ) -> Array | None:
         if not data:
             return None
         try:
             if self._packed:
-                return _unpack(data, count, self._step)
-            return np.frombuffer(data, self._kind).reshape(3, count).T
+                return _unpack(data, planes, count, step)
+            return np.frombuffer(data, self._kind).reshape(planes, count)
         except ValueError:
             text = f"the arrays of frame {message.number} are not as its header says"
             raise _no_frame(text) from None
 
 
-def _unpack(data: bytes, count: int, step: float) -> Array:
+def _unpack(data: bytes, planes: int, count: int, step: float) -> Array:
     """The array of FRAME_ENCODING_QUANTIZED_ZSTD."""
     import zstd  # for these alone
 
-    numbers = 3 * count
+    numbers = planes * count
     try:
         content = np.frombuffer(zstd.decompress(data), np.uint8)
     except zstd.Error as wrong:
@@ -120,10 +138,10 @@ def _unpack(data: bytes, count: int, step: float) -> Array:
     bytes_each = content.size // numbers
     packed = np.zeros((numbers, 8), np.uint8)
     packed[:, :bytes_each] = content.reshape(bytes_each, numbers).T
-    codes = packed.view("<u8").reshape(3, count)
+    codes = packed.view("<u8").reshape(planes, count)
     differences = (codes >> np.uint64(1)) ^ -(codes & np.uint64(1))
     steps = np.add.accumulate(differences, axis=1).view("<i8")
-    return cast(Array, steps * step).T
+    return cast(Array, steps * step)
 
 
 def _no_frame(text: str) -> Error:
@@ -148,7 +166,7 @@ class Parts:
             return None
         if part.number != self.frame.number:
             raise _no_frame(f"parts of frame {self.frame.number} make no frame")
-        for array in ("positions_m", "velocities_m_per_s", "normals", "strain"):
+        for array in _ARRAYS:
             setattr(self.frame, array, getattr(self.frame, array) + getattr(part, array))
         if part.continued:
             return None
@@ -188,6 +206,8 @@ def format_of(
     velocities: bool = False,
     normals: bool = False,
     strain: bool = False,
+    pressure: bool = False,
+    clearance: bool = False,
     particles: range | None = None,
     grid_step_m: float | None = None,
     topology: bool = False,
@@ -198,6 +218,8 @@ def format_of(
         velocities=velocities,
         normals=normals,
         strain=strain,
+        pressure=pressure,
+        clearance=clearance,
         stats=True,
         topology=topology,
         grid_step_m=grid_step_m,

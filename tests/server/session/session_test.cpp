@@ -60,6 +60,28 @@ TEST(Session, CarriesOutStepsOneAfterTheOther) {
   EXPECT_EQ(session->status().newest->number, 57);
 }
 
+TEST(Session, MakesNothingOfContactUntilSomebodyAsksAFrame) {
+  Scheduler scheduler(2);
+  Scene scene = hung_scene();
+  scene.colliders = {{"ball", Sphere{Vector3d(0.1, -0.2, 0), 0.1}, 0.3, {}}};
+  const auto session = make_session(scheduler, scene);
+  const auto first = session->status().newest;
+  step(*session, 20).applied();
+  const auto later = session->status().newest;
+  EXPECT_EQ(first->scene, later->scene);
+  EXPECT_EQ(later->meter->made(), 0);
+  const auto pressures = later->meter->pressures(later->scene, later->positions, later->time);
+  EXPECT_EQ(later->meter->made(), 1);
+  first->meter->pressures(first->scene, first->positions, first->time);
+  EXPECT_EQ(later->meter->made(), 1);
+
+  set_bend(*session, 3e-5).applied();
+  step(*session, 1).applied();
+  const auto changed = session->status().newest;
+  EXPECT_NE(changed->scene, later->scene);
+  EXPECT_EQ(later->meter->pressures(later->scene, later->positions, later->time), pressures);
+}
+
 // At rest, running without a goal.
 std::shared_ptr<Session> sleeping_session(Scheduler& scheduler) {
   const auto session = make_session(scheduler);

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "core/contact/contact.h"
+#include "core/contact/triangle_tree.h"
+#include "core/model/mesh.h"
+
+namespace weft {
+
+struct MovingSheet;
+
+// From the nearest collider of the scene, as contact sees it. bodies: placed for `time`.
+Distance distance_from_any(const Scene& scene, const MovingBodies& bodies, const Vector3d& x,
+                           double time);
+
+// What colliders press each particle with, Pa: all that forces and weight push it towards one that
+// it touches, over its area, a third of its triangles (of a grid a quarter of its cells). So it is
+// for cloth at rest. bodies: placed for `time`; x: (3 x particles) m, of a sheet in that scene.
+VectorXd pressures(const Scene& scene, const MovingBodies& bodies, const SheetDefinition& sheet,
+                   const MovingSheet& moving, const Matrix3Xd& x, double time);
+
+// Reads from frames of a simulation how cloth meets colliders, whenever somebody asks: what it says
+// follows from a frame's positions, and from textiles and colliders as they were then. Thread-safe;
+// those who ask wait for each other.
+class ContactMeter {
+ public:
+  // Bodies and shapes of sheets are those of all scenes that follow.
+  explicit ContactMeter(const Scene& scene);
+  ~ContactMeter();
+
+  // Of all sheets, one number of each particle. scene: as it was in the frame. positions: planes x,
+  // y, z of all particles, m.
+  std::vector<double> pressures(const std::shared_ptr<const Scene>& scene,
+                                const std::vector<double>& positions, double time);  // Pa
+  // From the surface of the nearest collider, m, negative inside; of bodies of triangles exactly.
+  // Precondition: the scene has colliders.
+  std::vector<double> clearances(const std::shared_ptr<const Scene>& scene,
+                                 const std::vector<double>& positions, double time);
+
+  // Until somebody asks again.
+  void release_memory();
+  // Meshes and trees made so far.
+  int made() const;
+
+ private:
+  // The triangles of a body where it was last placed.
+  struct Surface {
+    BodyMesh mesh;
+    std::unique_ptr<TriangleTree> tree;
+    double time = 0;
+    std::vector<int> nearest;  // triangle of each particle when it was last asked for, or -1
+  };
+
+  void take(const std::shared_ptr<const Scene>& scene, double time);
+  double clearance(const Scene& scene, const Vector3d& x, double time, std::size_t particle);
+  const TriangleTree& tree_of(const Collider& collider, Surface& surface, double time);
+
+  mutable std::mutex mutex_;
+  // Of the scene that was last asked for; empty: not made.
+  std::shared_ptr<const Scene> scene_;
+  std::vector<SheetDefinition> definitions_;
+  std::vector<MovingSheet> sheets_;
+  MovingBodies bodies_;
+  std::vector<Surface> surfaces_;  // of bodies of triangles, by collider
+  int made_ = 0;
+};
+
+}  // namespace weft

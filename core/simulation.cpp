@@ -6,9 +6,9 @@
 
 #include "core/cloth_contact/tangles.h"
 #include "core/contact/contact.h"
-#include "core/contact_values.h"
 #include "core/forces/air.h"
 #include "core/forces/elastic.h"
+#include "core/frame_values.h"
 #include "core/model/self_weight.h"
 #include "core/simulation_state.h"
 
@@ -430,18 +430,25 @@ Verdict Simulation::verdict() const {
   return judge(state_->scene, state_->bodies, state_->sheets, time(), at_rest());
 }
 
-FrameStats Simulation::stats() const {
-  state_->restore_memory();
-  FrameStats stats;
-  for (const MovingSheet& sheet : state_->sheets) {
-    const Matrix3Xd& x = sheet.good().x;
-    stats.kinetic_energy += sheet.good().kinetic_energy;
-    stats.potential_energy +=
-        elastic_energy(sheet.mesh, x) - sheet.mesh.mass.dot(x.transpose() * sheet.dynamics.gravity);
-    stats.largest_strain = std::max(stats.largest_strain, largest_strain(sheet.mesh, x));
-  }
-  if (state_->cloth_contact) stats.cloth_cuts = state_->cloth_contact->count_cuts(state_->sheets);
-  return stats;
+double Simulation::kinetic_energy() const {
+  double sum = 0;
+  for (const MovingSheet& sheet : state_->sheets) sum += sheet.good().kinetic_energy;
+  return sum;
 }
+
+std::optional<std::int64_t> Simulation::cloth_cuts() const {
+  state_->restore_memory();
+  if (!state_->cloth_contact) return std::nullopt;
+  return state_->cloth_contact->count_cuts(state_->sheets);
+}
+
+Deformation Simulation::deformation() const {
+  state_->restore_memory();
+  Deformation all;
+  for (const MovingSheet& sheet : state_->sheets) add(sheet, sheet.good().x, all);
+  return all;
+}
+
+FrameStats Simulation::stats() const { return {deformation(), kinetic_energy(), cloth_cuts()}; }
 
 }  // namespace weft

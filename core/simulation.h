@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/frame_values.h"
 #include "core/model/mesh.h"
 #include "core/model/scene.h"
 #include "core/motion/thread_pool.h"
@@ -18,10 +19,8 @@
 
 namespace weft {
 
-struct FrameStats {
+struct FrameStats : Deformation {
   double kinetic_energy = 0;                    // J
-  double potential_energy = 0;                  // elastic + gravity, 0 at the origin, J
-  double largest_strain = 0;                    // of the stretch connections
   std::optional<std::int64_t> cloth_cuts = {};  // of scenes with cloth contact
 };
 
@@ -84,13 +83,16 @@ class Simulation {
   // Planes x, y, z of all sheets in scene order; out has 3 x particle_count values.
   void copy_positions(std::span<double> out) const;   // m
   void copy_velocities(std::span<double> out) const;  // m/s
+  double kinetic_energy() const;                      // J
+  std::optional<std::int64_t> cloth_cuts() const;
+  Deformation deformation() const;
   FrameStats stats() const;
   // How the sheets sit, which takes about as long as some substeps.
   Verdict verdict() const;
   // The scene with the textiles, pins and paths of the last frame, without a start that nothing
   // depends on any more; the same until they change.
   std::shared_ptr<const Scene> scene_of_frame() const;
-  // What colliders press each particle of a sheet with, Pa, see core/contact_values.h.
+  // What colliders press each particle of a sheet with, Pa, see core/frame_values.h.
   VectorXd pressures(std::size_t sheet) const;
 
   // Changes the textile of a sheet between frames: positions and velocities stay, the step is

@@ -49,7 +49,7 @@ void Simulation::State::go_back_to(const Snapshot& before) {
   assert(taken);
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const Snapshot::Sheet& saved = before.sheets[s];
-    SheetState good{saved.x, saved.v, kinetic_energy(sheets[s].mesh, saved.v)};
+    SheetState good{saved.x, saved.v, weft::kinetic_energy(sheets[s].mesh, saved.v)};
     sheets[s].set_good(good);
   }
 }

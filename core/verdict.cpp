@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/cloth_contact/cuts.h"
-#include "core/contact_values.h"
+#include "core/frame_values.h"
 #include "core/model/strain.h"
 #include "core/model/text.h"
 #include "core/moving_sheet.h"

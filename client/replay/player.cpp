@@ -26,10 +26,9 @@ std::shared_ptr<const Frame> frame_of(const v1::Frame& recorded, const v1::Strea
     frame->velocities = planes(recorded.velocities_m_per_s(), header);
   if (header.format().pressure()) frame->pressures = read_pressures(recorded, header);
   if (header.format().clearance()) frame->clearances = read_clearances(recorded, header);
-  frame->stats.kinetic_energy = stats.kinetic_energy_j();
-  frame->stats.potential_energy = stats.potential_energy_j();
-  frame->stats.largest_strain = stats.largest_strain();
-  if (stats.has_cloth_cut_count()) frame->stats.cloth_cuts = stats.cloth_cut_count();
+  frame->kinetic_energy = stats.kinetic_energy_j();
+  frame->deformation = {stats.potential_energy_j(), stats.largest_strain()};
+  if (stats.has_cloth_cut_count()) frame->cloth_cuts = stats.cloth_cut_count();
   frame->at_rest = stats.at_rest();
   frame->substeps = stats.substep_count();
   frame->substep = stats.substep_s();

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kMostProblems = 100;
 constexpr std::size_t kMostVertices = 1'000'000, kMostTriangles = 2'000'000;
-constexpr double kFarthest = 1e4;  // m
+constexpr double kMostDistance = 1e4;  // m
 
 class Mender {
  public:
@@ -54,8 +54,8 @@ class Mender {
       problem("triangles", "has ", triangles.size(), " triangles; 4 to ", kMostTriangles,
               " are needed");
     for (std::size_t i = 0; i < vertices.size(); ++i)
-      if (!(vertices[i].array().abs() <= kFarthest).all())  // nor where one is no number
-        problem("positions_m", "vertex ", i, " does not lie within ", kFarthest,
+      if (!(vertices[i].array().abs() <= kMostDistance).all())  // nor where one is no number
+        problem("positions_m", "vertex ", i, " does not lie within ", kMostDistance,
                 " m of the origin along each axis");
     for (std::size_t t = 0; t < triangles.size(); ++t)
       for (const int i : triangles[t])

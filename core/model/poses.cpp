@@ -58,8 +58,8 @@ double fastest(const Poses& poses, double begin, double end) {
 std::vector<Problem> find_problems(const Poses& poses, std::size_t vertices,
                                    const std::string& field) {
   constexpr std::size_t kMostPoses = 10'000, kMostProblems = 100;
-  constexpr double kLatest = 1e6, kFarthest = 1e4;  // s, m
-  constexpr double kRounding = 1e-6;                // of a way between positions in float
+  constexpr double kLatest = 1e6, kMostDistance = 1e4;  // s, m
+  constexpr double kRounding = 1e-6;                    // of a way between positions in float
   std::vector<Problem> problems;
   const auto problem = [&](const std::string& name, const auto&... message) {
     if (problems.size() < kMostProblems) problems.push_back({field + "." + name, join(message...)});
@@ -82,8 +82,8 @@ std::vector<Problem> find_problems(const Poses& poses, std::size_t vertices,
 
   for (std::size_t p = 0; p < times.size(); ++p)
     for (std::size_t v = 0; v < vertices; ++v)
-      if (!(poses.position(p, v).array().abs() <= kFarthest).all())
-        problem("positions_m", "vertex ", v, " of pose ", p, " does not lie within ", kFarthest,
+      if (!(poses.position(p, v).array().abs() <= kMostDistance).all())
+        problem("positions_m", "vertex ", v, " of pose ", p, " does not lie within ", kMostDistance,
                 " m of the origin along each axis");
   if (!problems.empty()) return problems;
   for (std::size_t p = 0; p + 1 < times.size(); ++p) {

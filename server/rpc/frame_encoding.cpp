@@ -230,14 +230,15 @@ std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order) {
                                  : frame.clearances));
   if (format.stats()) {
     v1::FrameStats* stats = message.mutable_stats();
-    stats->set_kinetic_energy_j(frame.stats.kinetic_energy);
-    stats->set_potential_energy_j(frame.stats.potential_energy);
-    stats->set_largest_strain(frame.stats.largest_strain);
+    const Deformation deformation = deformation_of(frame);
+    stats->set_kinetic_energy_j(frame.kinetic_energy);
+    stats->set_potential_energy_j(deformation.potential_energy);
+    stats->set_largest_strain(deformation.largest_strain);
     stats->set_substep_count(frame.substeps);
     stats->set_substep_s(frame.substep);
     stats->set_at_rest(frame.at_rest);
     stats->set_repair_count(static_cast<std::int64_t>(frame.repairs.size()));
-    if (frame.stats.cloth_cuts) stats->set_cloth_cut_count(*frame.stats.cloth_cuts);
+    if (frame.cloth_cuts) stats->set_cloth_cut_count(*frame.cloth_cuts);
   }
   return in_parts(std::move(message), order.most_bytes);
 }

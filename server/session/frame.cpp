@@ -21,4 +21,10 @@ void EncodingCache::count_in(std::shared_ptr<ByteMeter> meter) const {
   if (meter_) meter_->add(bytes_);
 }
 
+Deformation deformation_of(const Frame& frame) {
+  if (frame.deformation) return *frame.deformation;
+  if (!frame.meter) return {};
+  return frame.meter->deformation(frame.scene, frame.positions, frame.time);
+}
+
 }  // namespace weft

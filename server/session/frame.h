@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "core/contact_values.h"
+#include "core/frame_values.h"
 #include "core/simulation.h"
 #include "server/session/history_budget.h"
 
@@ -41,25 +41,30 @@ class EncodingCache {
 // The state of a session at one time. Never changes once it is published.
 struct Frame {
   std::int64_t number = 0;
-  double time = 0;                 // s
-  std::vector<double> positions;   // (3 x particles) planes x, y, z, m
-  std::vector<double> velocities;  // (3 x particles) planes x, y, z, m/s
-  FrameStats stats;
+  double time = 0;                         // s
+  std::vector<double> positions;           // (3 x particles) planes x, y, z, m
+  std::vector<double> velocities;          // (3 x particles) planes x, y, z, m/s
+  double kinetic_energy = 0;               // J
+  std::optional<std::int64_t> cloth_cuts;  // of scenes with cloth contact
   bool at_rest = false;
   std::int64_t substeps = 0;    // since the frame before
   double substep = 0;           // s
   std::vector<Repair> repairs;  // that it took
-  // What pressures and clearances are read with: the scene as it was, and what reads them. Where
-  // there is none they are those below, or were not recorded.
+  // What the values below are read with: the scene as it was, and what reads them. Where there is
+  // none they were recorded, or not.
   std::shared_ptr<const Scene> scene;
-  std::shared_ptr<ContactMeter> meter;
-  std::vector<double> pressures;   // (particles) Pa
-  std::vector<double> clearances;  // (particles) m
+  std::shared_ptr<FrameMeter> meter;
+  std::optional<Deformation> deformation;  // absent: nobody read frames when it was made
+  std::vector<double> pressures;           // (particles) Pa
+  std::vector<double> clearances;          // (particles) m
   EncodingCache encodings;
 
   std::size_t bytes() const {  // without encodings
     return sizeof(Frame) + (positions.size() + velocities.size()) * sizeof(double);
   }
 };
+
+// As it came with the frame, or computed now.
+Deformation deformation_of(const Frame& frame);
 
 }  // namespace weft

@@ -53,7 +53,7 @@ Session::Session(SessionIdentity identity, Simulation simulation, const SessionH
       audience_(host.history, host.return_time),
       textiles_(textiles_of(scene_)),
       plan_(std::make_shared<const Plan>(timeline_.simulation.plan())) {
-  audience_.begin(timeline_.make_frame({}));
+  audience_.begin(timeline_.make_frame({}, false));
 }
 
 std::optional<Clock::time_point> Session::run_slice() {
@@ -131,6 +131,11 @@ bool Session::frame_unwanted() const {
   return !restoring_ && (queue_.has_pause() || queue_.step_cancelled());
 }
 
+bool Session::is_read() const {
+  std::lock_guard lock(mutex_);
+  return audience_.has_any();
+}
+
 void Session::compute_frame(Clock::time_point due) {
   const FramePart part = timeline_.advance(scheduler_);
   {
@@ -145,7 +150,7 @@ void Session::end_frame(FramePart part, Clock::time_point due) {
   auto repairs = publish_repairs();
   if (part == FramePart::kFailed) return fail("the solver diverged: " + simulation.failure());
   timeline_.count_frame(stats_);
-  const auto frame = timeline_.make_frame(std::move(repairs));
+  const auto frame = timeline_.make_frame(std::move(repairs), is_read());
   {
     std::lock_guard lock(mutex_);
     if (closed_) return;

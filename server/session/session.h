@@ -170,6 +170,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   bool settle_steps();
   bool go_on_with_frame();
   bool frame_unwanted() const;
+  bool is_read() const;
   void compute_frame(Clock::time_point due);
   void end_frame(FramePart part, Clock::time_point due);
   std::vector<Repair> publish_repairs();

@@ -12,7 +12,7 @@ namespace weft {
 Timeline::Timeline(Simulation given, std::int64_t max_frame_work, Duration snapshot_after)
     : simulation(std::move(given)),
       snapshot_after_(snapshot_after),
-      meter_(std::make_shared<ContactMeter>(simulation.scene())) {
+      meter_(std::make_shared<FrameMeter>(simulation.scene())) {
   if (max_frame_work > 0) simulation.limit_frame_work(max_frame_work);
 }
 
@@ -62,7 +62,7 @@ bool Timeline::drop_frame() {
   return true;
 }
 
-std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs) const {
+std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs, bool read) const {
   auto frame = std::make_shared<Frame>();
   const std::size_t values = 3 * static_cast<std::size_t>(simulation.particle_count());
   frame->number = simulation.frame();
@@ -71,7 +71,9 @@ std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs) c
   frame->velocities.resize(values);
   simulation.copy_positions(frame->positions);
   simulation.copy_velocities(frame->velocities);
-  frame->stats = simulation.stats();
+  frame->kinetic_energy = simulation.kinetic_energy();
+  frame->cloth_cuts = simulation.cloth_cuts();
+  if (read) frame->deformation = simulation.deformation();
   frame->at_rest = simulation.at_rest();
   frame->substeps = simulation.substeps();
   frame->substep = simulation.plan().step.substep;

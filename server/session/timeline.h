@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/contact_values.h"
+#include "core/frame_values.h"
 #include "core/simulation.h"
 #include "server/session/command.h"
 #include "server/session/frame.h"
@@ -32,7 +32,9 @@ class Timeline {
   Judgement judge() const { return {simulation.verdict(), substeps_, computing_.count()}; }
   // Takes back the frame under way; false where it cannot be.
   [[nodiscard]] bool drop_frame();
-  std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs) const;
+  // read: somebody waits for it, and will want to know of its energy and strain, which else are
+  // computed when somebody asks.
+  std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs, bool read) const;
   // Those of the present frame.
   std::vector<Repair> repairs_of_frame() const;
 
@@ -54,7 +56,7 @@ class Timeline {
   std::int64_t entries_in_snapshot_ = 0;  // the last one
   Duration computing_{};                  // of all frames
   std::int64_t substeps_ = 0;             // of all frames
-  std::shared_ptr<ContactMeter> meter_;   // of all frames
+  std::shared_ptr<FrameMeter> meter_;     // of all frames
 };
 
 }  // namespace weft

@@ -82,6 +82,23 @@ TEST(Session, MakesNothingOfContactUntilSomebodyAsksAFrame) {
   EXPECT_EQ(later->meter->pressures(later->scene, later->positions, later->time), pressures);
 }
 
+TEST(Session, ComputesEnergyAndStrainOnlyWhereFramesAreRead) {
+  Scheduler scheduler(2);
+  const auto unread = make_session(scheduler), read = make_session(scheduler);
+  const auto watcher = Watcher::of(*read, 0);
+  for (const auto& session : {unread, read}) {
+    step(*session, 10).applied();
+    set_bend(*session, 3e-5).applied();
+    step(*session, 1).applied();
+  }
+  const auto one = unread->status().newest, other = read->status().newest;
+  EXPECT_FALSE(one->deformation);
+  ASSERT_TRUE(other->deformation);
+  EXPECT_EQ(one->meter->made(), 0);
+  EXPECT_EQ(deformation_of(*one).potential_energy, other->deformation->potential_energy);
+  EXPECT_EQ(deformation_of(*one).largest_strain, other->deformation->largest_strain);
+}
+
 // At rest, running without a goal.
 std::shared_ptr<Session> sleeping_session(Scheduler& scheduler) {
   const auto session = make_session(scheduler);
@@ -513,8 +530,9 @@ std::vector<std::shared_ptr<const Frame>> finite_frames(Watcher& watcher, std::i
     const Frame& frame = *frames.back();
     for (const double value : frame.positions) EXPECT_TRUE(std::isfinite(value));
     for (const double value : frame.velocities) EXPECT_TRUE(std::isfinite(value));
-    EXPECT_TRUE(std::isfinite(frame.stats.kinetic_energy + frame.stats.potential_energy +
-                              frame.stats.largest_strain));
+    const Deformation deformation = deformation_of(frame);
+    EXPECT_TRUE(std::isfinite(frame.kinetic_energy + deformation.potential_energy +
+                              deformation.largest_strain));
   } while (frames.back()->number < last);
   return frames;
 }

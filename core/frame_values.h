@@ -22,15 +22,26 @@ Distance distance_from_any(const Scene& scene, const MovingBodies& bodies, const
 VectorXd pressures(const Scene& scene, const MovingBodies& bodies, const SheetDefinition& sheet,
                    const MovingSheet& moving, const Matrix3Xd& x, double time);
 
-// Reads from frames of a simulation how cloth meets colliders, whenever somebody asks: what it says
-// follows from a frame's positions, and from textiles and colliders as they were then. Thread-safe;
-// those who ask wait for each other.
-class ContactMeter {
+// What a frame's positions say of its sheets.
+struct Deformation {
+  double potential_energy = 0;  // elastic + gravity, 0 at the origin, J
+  double largest_strain = 0;    // of the stretch connections
+};
+// x: (3 x particles) m, of the sheet.
+void add(const MovingSheet& sheet, const Matrix3Xd& x, Deformation& deformation);
+
+// Reads from frames of a simulation how cloth is deformed and meets colliders, whenever somebody
+// asks: what it says follows from a frame's positions, and from textiles and colliders as they were
+// then, to the bit. Thread-safe; those who ask wait for each other.
+class FrameMeter {
  public:
   // Bodies and shapes of sheets are those of all scenes that follow.
-  explicit ContactMeter(const Scene& scene);
-  ~ContactMeter();
+  explicit FrameMeter(const Scene& scene);
+  ~FrameMeter();
 
+  // Of all sheets. scene, positions: as below.
+  Deformation deformation(const std::shared_ptr<const Scene>& scene,
+                          const std::vector<double>& positions, double time);
   // Of all sheets, one number of each particle. scene: as it was in the frame. positions: planes x,
   // y, z of all particles, m.
   std::vector<double> pressures(const std::shared_ptr<const Scene>& scene,
@@ -55,6 +66,9 @@ class ContactMeter {
   };
 
   void take(const std::shared_ptr<const Scene>& scene, double time);
+  // Calls f(sheet, x) with the positions of each, (3 x particles) m.
+  template <class F>
+  void for_each_sheet(const std::vector<double>& positions, const F& f) const;
   double clearance(const Scene& scene, const Vector3d& x, double time, std::size_t particle);
   const TriangleTree& tree_of(const Collider& collider, Surface& surface, double time);
 

@@ -1,4 +1,4 @@
-#include "core/contact_values.h"
+#include "core/frame_values.h"
 
 #include <gmock/gmock.h>
 
@@ -53,14 +53,14 @@ std::vector<double> planes(const Matrix3Xd& x) {
 
 Collider table() { return {"table", Plane{}, 0.3, {}}; }
 
-TEST(ContactValues, APatchAtRestOnATablePressesWithItsWeightOverItsArea) {
+TEST(FrameValues, APatchAtRestOnATablePressesWithItsWeightOverItsArea) {
   for (const SheetShape& shape : patches()) {
     Scene scene;
     scene.sheets = {patch(shape)};
     scene.colliders = {table()};
     Simulation simulation(scene);
     for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(simulation.advance_frame());
-    ContactMeter meter(scene);
+    FrameMeter meter(scene);
     const Matrix3Xd x = positions(simulation);
     const auto pressures =
         meter.pressures(simulation.scene_of_frame(), planes(x), simulation.time());
@@ -76,20 +76,20 @@ TEST(ContactValues, APatchAtRestOnATablePressesWithItsWeightOverItsArea) {
   }
 }
 
-TEST(ContactValues, WhatTouchesNothingIsNotPressed) {
+TEST(FrameValues, WhatTouchesNothingIsNotPressed) {
   Scene scene;
   scene.sheets = {patch(patches()[1])};
   scene.sheets[0].origin = {0, 0.3, 0};
   scene.colliders = {table()};
   const Matrix3Xd x = start_positions(scene.sheets[0]);
-  ContactMeter meter(scene);
+  FrameMeter meter(scene);
   const auto shared = std::make_shared<const Scene>(scene);
   EXPECT_THAT(meter.pressures(shared, planes(x), 0), ::testing::Each(0));
   EXPECT_THAT(meter.clearances(shared, planes(x), 0),
               ::testing::Each(::testing::DoubleNear(0.3, 1e-12)));
 }
 
-TEST(ContactValues, ClearanceIsTheDistanceFromTheExactSphere) {
+TEST(FrameValues, ClearanceIsTheDistanceFromTheExactSphere) {
   constexpr double kRadius = 0.15;
   const Vector3d center(0.02, 0.1, -0.05);
   BodyMesh ball = ball_mesh(kRadius, 4);
@@ -100,7 +100,7 @@ TEST(ContactValues, ClearanceIsTheDistanceFromTheExactSphere) {
   const Matrix3Xd x = 0.4 * noise(121);  // deep inside, near, and far from the grid
   for (const bool exact : {true, false}) {
     scene.colliders = {exact ? Collider{"ball", Sphere{center, kRadius}, 0.3, {}} : solid(ball)};
-    ContactMeter meter(scene);
+    FrameMeter meter(scene);
     const auto found = meter.clearances(std::make_shared<const Scene>(scene), planes(x), 0);
     int inside = 0;
     for (Eigen::Index i = 0; i < x.cols(); ++i) {
@@ -113,7 +113,7 @@ TEST(ContactValues, ClearanceIsTheDistanceFromTheExactSphere) {
   }
 }
 
-TEST(ContactValues, ClearanceFollowsABodyThroughItsPosesAndAlongItsPath) {
+TEST(FrameValues, ClearanceFollowsABodyThroughItsPosesAndAlongItsPath) {
   Collider body =
       posed(box_mesh({0.1, 0.05, 0.08}), {0, 0.5, 1}, [](const Vector3d& vertex, double time) {
         return Vector3d(Eigen::AngleAxisd(0.6 * time, Vector3d::UnitZ()) * vertex +
@@ -124,7 +124,7 @@ TEST(ContactValues, ClearanceFollowsABodyThroughItsPosesAndAlongItsPath) {
   scene.sheets = {patch(patches()[0])};
   scene.colliders = {body};
   const Matrix3Xd x = 0.4 * noise(121, 7);
-  ContactMeter meter(scene);
+  FrameMeter meter(scene);
   const auto shared = std::make_shared<const Scene>(scene);
   for (const double time : {0.0, 0.3, 0.5, 0.9, 2.0}) {
     const auto found = meter.clearances(shared, planes(x), time);
@@ -135,7 +135,7 @@ TEST(ContactValues, ClearanceFollowsABodyThroughItsPosesAndAlongItsPath) {
   }
 }
 
-TEST(ContactValues, AreThoseOfTheTextileThatTheFrameHad) {
+TEST(FrameValues, AreThoseOfTheTextileThatTheFrameHad) {
   Scene scene;
   scene.sheets = {patch(patches()[1])};
   scene.colliders = {table()};
@@ -148,7 +148,7 @@ TEST(ContactValues, AreThoseOfTheTextileThatTheFrameHad) {
   std::get<MeasuredTextile>(heavy.model).areal_density *= 3;
   ASSERT_FALSE(simulation.set_textile(0, heavy));
   const auto after = simulation.scene_of_frame();
-  ContactMeter meter(scene);
+  FrameMeter meter(scene);
   const double light = meter.pressures(before, x, simulation.time())[60];
   EXPECT_NEAR(meter.pressures(after, x, simulation.time())[60], 3 * light, 0.05 * light);
   EXPECT_EQ(meter.pressures(before, x, simulation.time())[60], light);

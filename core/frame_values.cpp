@@ -1,4 +1,4 @@
-#include "core/contact_values.h"
+#include "core/frame_values.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,9 +31,9 @@ VectorXd areas_of(const SheetShape& shape, const Matrix3Xd& x) {
   return areas;
 }
 
-using Planes = Eigen::Map<const Eigen::MatrixX3d>;
+using PositionPlanes = Eigen::Map<const Eigen::MatrixX3d>;
 
-Planes planes_of(const std::vector<double>& positions) {
+PositionPlanes planes_of(const std::vector<double>& positions) {
   return {positions.data(), static_cast<Eigen::Index>(positions.size() / 3), 3};
 }
 
@@ -81,12 +81,18 @@ VectorXd pressures(const Scene& scene, const MovingBodies& bodies, const SheetDe
   return pressure;
 }
 
-ContactMeter::ContactMeter(const Scene& scene)
+void add(const MovingSheet& sheet, const Matrix3Xd& x, Deformation& deformation) {
+  deformation.potential_energy +=
+      elastic_energy(sheet.mesh, x) - sheet.mesh.mass.dot(x.transpose() * sheet.dynamics.gravity);
+  deformation.largest_strain = std::max(deformation.largest_strain, largest_strain(sheet.mesh, x));
+}
+
+FrameMeter::FrameMeter(const Scene& scene)
     : bodies_(scene.colliders), surfaces_(scene.colliders.size()) {}
-ContactMeter::~ContactMeter() = default;
+FrameMeter::~FrameMeter() = default;
 
 // Has the sheets as they are in the frame at `time`.
-void ContactMeter::take(const std::shared_ptr<const Scene>& scene, double time) {
+void FrameMeter::take(const std::shared_ptr<const Scene>& scene, double time) {
   const DressingState dressing =
       scene->dressing ? dressing_at(*scene->dressing, time) : DressingState();
   if (scene_ == scene) {
@@ -107,30 +113,46 @@ void ContactMeter::take(const std::shared_ptr<const Scene>& scene, double time) 
   scene_ = scene;
 }
 
-std::vector<double> ContactMeter::pressures(const std::shared_ptr<const Scene>& scene,
-                                            const std::vector<double>& positions, double time) {
+template <class F>
+void FrameMeter::for_each_sheet(const std::vector<double>& positions, const F& f) const {
+  const PositionPlanes all = planes_of(positions);
+  Eigen::Index first = 0;
+  for (std::size_t s = 0; s < sheets_.size(); ++s) {
+    const Matrix3Xd x = all.middleRows(first, definitions_[s].particle_count()).transpose();
+    f(s, x);
+    first += x.cols();
+  }
+}
+
+Deformation FrameMeter::deformation(const std::shared_ptr<const Scene>& scene,
+                                    const std::vector<double>& positions, double time) {
+  const std::lock_guard lock(mutex_);
+  take(scene, time);
+  Deformation all;
+  for_each_sheet(positions,
+                 [&](std::size_t s, const Matrix3Xd& x) { weft::add(sheets_[s], x, all); });
+  return all;
+}
+
+std::vector<double> FrameMeter::pressures(const std::shared_ptr<const Scene>& scene,
+                                          const std::vector<double>& positions, double time) {
   const std::lock_guard lock(mutex_);
   take(scene, time);
   bodies_.place(time, 0);
-  const Planes all = planes_of(positions);
   std::vector<double> values;
-  Eigen::Index first = 0;
-  for (std::size_t s = 0; s < sheets_.size(); ++s) {
-    const SheetDefinition& sheet = definitions_[s];
-    const Matrix3Xd x = all.middleRows(first, sheet.particle_count()).transpose();
-    const VectorXd found = weft::pressures(*scene, bodies_, sheet, sheets_[s], x, time);
+  for_each_sheet(positions, [&](std::size_t s, const Matrix3Xd& x) {
+    const VectorXd found = weft::pressures(*scene, bodies_, definitions_[s], sheets_[s], x, time);
     values.insert(values.end(), found.begin(), found.end());
-    first += x.cols();
-  }
+  });
   return values;
 }
 
-std::vector<double> ContactMeter::clearances(const std::shared_ptr<const Scene>& scene,
-                                             const std::vector<double>& positions, double time) {
+std::vector<double> FrameMeter::clearances(const std::shared_ptr<const Scene>& scene,
+                                           const std::vector<double>& positions, double time) {
   const std::lock_guard lock(mutex_);
   bodies_.place(time, 0);
   const double deflate = scene->dressing ? dressing_at(*scene->dressing, time).deflate : 0;
-  const Planes all = planes_of(positions);
+  const PositionPlanes all = planes_of(positions);
   std::vector<double> values(static_cast<std::size_t>(all.rows()));
   for (Surface& surface : surfaces_) surface.nearest.resize(values.size(), -1);
   for (std::size_t i = 0; i < values.size(); ++i)
@@ -139,8 +161,8 @@ std::vector<double> ContactMeter::clearances(const std::shared_ptr<const Scene>&
   return values;
 }
 
-double ContactMeter::clearance(const Scene& scene, const Vector3d& x, double time,
-                               std::size_t particle) {
+double FrameMeter::clearance(const Scene& scene, const Vector3d& x, double time,
+                             std::size_t particle) {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < scene.colliders.size(); ++c) {
     const Collider& collider = scene.colliders[c];
@@ -160,7 +182,7 @@ double ContactMeter::clearance(const Scene& scene, const Vector3d& x, double tim
   return least;
 }
 
-const TriangleTree& ContactMeter::tree_of(const Collider& collider, Surface& surface, double time) {
+const TriangleTree& FrameMeter::tree_of(const Collider& collider, Surface& surface, double time) {
   if (surface.tree && (!collider.poses || surface.time == time)) return *surface.tree;
   ++made_;
   if (collider.poses) surface.mesh = mesh_at(collider, time);
@@ -170,7 +192,7 @@ const TriangleTree& ContactMeter::tree_of(const Collider& collider, Surface& sur
   return *surface.tree;
 }
 
-void ContactMeter::release_memory() {
+void FrameMeter::release_memory() {
   const std::lock_guard lock(mutex_);
   scene_.reset();
   sheets_.clear();
@@ -179,7 +201,7 @@ void ContactMeter::release_memory() {
   bodies_.release_memory();
 }
 
-int ContactMeter::made() const {
+int FrameMeter::made() const {
   const std::lock_guard lock(mutex_);
   return made_;
 }

@@ -31,7 +31,7 @@ BendingLaw default_bending(Accuracy accuracy) {
 }
 
 double end_of_untangling(const Scene& scene) {
-  constexpr double kAfterDressing = 1;  // s
+  constexpr double kAfterDressing = 3;  // s
   if (!scene.cloth_contact) return 0;
   if (scene.untangle) return *scene.untangle;
   return scene.dressing ? scene.dressing->end() + kAfterDressing : 0;

@@ -177,7 +177,7 @@ TEST(Untangling, IsPartOfADressing) {
   scene.dressing.emplace();
   scene.dressing->close = 2;
   scene.dressing->settle = 0.5;
-  EXPECT_DOUBLE_EQ(end_of_untangling(scene), 3.5);
+  EXPECT_DOUBLE_EQ(end_of_untangling(scene), 5.5);
   scene.untangle = 0;
   EXPECT_EQ(end_of_untangling(scene), 0);
 }

@@ -373,8 +373,7 @@ std::vector<Problem> find_problems(const Scene& scene) {
   if (scene.dressing) check_dressing(scene, sound, check);
   if (scene.untangle) {
     check.number("untangle_s", *scene.untangle, 0, 1000, "s");
-    if (!scene.cloth_contact)
-      check.problem("cloth_contact", "is false; untangle_s needs it");
+    if (!scene.cloth_contact) check.problem("cloth_contact", "is false; untangle_s needs it");
   }
   check_environment(scene.environment, check);
   check_solver(scene.solver, check);

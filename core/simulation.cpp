@@ -51,6 +51,8 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   constexpr int kParticles = 4096;  // whose substep takes longer than to ask
   const std::int64_t turn = std::max(1, kParticles / particle_count());
   const double begin = time(), dt = plan.step.substep;
+  if (cloth_contact && unfinished->substeps == 0)
+    cloth_contact->untangle(sheets, begin < end_of_untangling(scene));
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
     step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
     ++k;

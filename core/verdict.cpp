@@ -61,7 +61,14 @@ void find_slid(const Scene& scene, const std::vector<MovingSheet>& sheets,
   }
 }
 
-void find_faults(const Scene& scene, Verdict& verdict) {
+std::string cuts_text(const Scene& scene, std::int64_t cuts, double time) {
+  std::string text = join(cuts, " edges pass through cloth");
+  if (const double end = end_of_untangling(scene); end > 0 && time >= end)
+    text += join(", which could not be led apart within ", end, " s");
+  return text;
+}
+
+void find_faults(const Scene& scene, double time, Verdict& verdict) {
   const auto fault = [&](const char* code, const std::string& message) {
     verdict.faults.push_back({code, message});
   };
@@ -69,8 +76,7 @@ void find_faults(const Scene& scene, Verdict& verdict) {
     fault("NOT_DRESSED",
           join("seams close, weight comes in and holds end by ", scene.dressing->end(), " s"));
   if (!verdict.at_rest) fault("NOT_AT_REST", "the cloth still moves");
-  if (verdict.cloth_cuts > 0)
-    fault("CLOTH_CUTS", join(verdict.cloth_cuts, " edges pass through cloth"));
+  if (verdict.cloth_cuts > 0) fault("CLOTH_CUTS", cuts_text(scene, verdict.cloth_cuts, time));
   if (verdict.particles_inside > 0)
     fault("INSIDE_BODY", join(verdict.particles_inside, " particles are inside a collider, up to ",
                               1000 * verdict.deepest, " mm deep"));
@@ -102,7 +108,7 @@ Verdict judge(const Scene& scene, const MovingBodies& bodies,
       verdict.largest_pressure =
           std::max(verdict.largest_pressure,
                    pressures(scene, bodies, scene.sheets[s], sheets[s], x[s], time).maxCoeff());
-  find_faults(scene, verdict);
+  find_faults(scene, time, verdict);
   return verdict;
 }
 

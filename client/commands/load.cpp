@@ -9,13 +9,17 @@
 
 #include "client/commands/commands.h"
 #include "client/exports/output_file.h"
+#include "client/garments/garment_scene.h"
+#include "client/garments/garment_templates.h"
 #include "client/input_file.h"
+#include "client/load/garments.h"
 #include "client/load/limit.h"
 #include "client/load/load_page.h"
 #include "client/output/status.h"
 #include "client/output/text.h"
 #include "client/scene_file.h"
 #include "client/templates/templates.h"
+#include "client/textile_file.h"
 
 namespace weft::client {
 namespace {
@@ -32,6 +36,9 @@ struct LoadOptions {
   std::string against;
   std::vector<std::string> compare;
   std::string page;
+  std::optional<int> garments;
+  int at_once = 2;
+  double seconds = 20;
 };
 
 constexpr std::array kQuantiles{std::pair{"p50", 0.5}, std::pair{"p90", 0.9},
@@ -321,6 +328,62 @@ void search_limit(Context& context, const LoadOrder& order, double target_s, Pag
   }
 }
 
+// A T-shirt on a form of size 40.
+v1::Scene tshirt_scene(Connection& connection) {
+  const DressForm form = make_dress_form(measures_of({}));
+  GarmentOrder order;
+  order.name = "tshirt";
+  order.pattern = make_garment(order.name, form);
+  order.textile = textile_named("jersey_interlock");
+  order.edge_m = 0.02;
+  order.bodies.push_back(garment_body(form));
+  return make_garment_scene(connection, order).scene;
+}
+
+std::string garments_text(const GarmentsResult& result) {
+  Facts facts;
+  facts.add("garments", fmt::format("{} put on, {} good", result.done, result.good))
+      .add("rate", fmt::format("{:.0f} an hour", result.per_hour()))
+      .add("time",
+           fmt::format("{} in all, {} of processors for each", seconds_text(result.wall.count()),
+                       seconds_text(result.computing_s / std::max(1, result.done))));
+  for (const auto& [code, count] : result.faults)
+    facts.add("faults", fmt::format("{} x {}", count, code));
+  for (const auto& [reason, count] : result.errors)
+    facts.add("errors", fmt::format("{} x {}", count, reason));
+  return facts.text();
+}
+
+void load_with_garments(Context& context, const LoadOptions& options) {
+  GarmentsOrder order;
+  order.scene =
+      options.scene.empty() ? tshirt_scene(context.connection()) : read_scene(options.scene);
+  order.garments = *options.garments;
+  order.at_once = options.at_once;
+  order.seconds = options.seconds;
+  Status status(context.terminal.err, context.terminal.err_is_watched);
+  const GarmentsResult result =
+      put_on(context.connection(), order, [&](const GarmentsResult& so_far) {
+        status.show({fmt::format("{} of {} put on, {:.0f} an hour", so_far.done, order.garments,
+                                 so_far.per_hour())});
+      });
+  status.clear();
+  context.answer({{"garments", result.done},
+                  {"good", result.good},
+                  {"garments_per_hour", result.per_hour()},
+                  {"faults", result.faults},
+                  {"errors", result.errors},
+                  {"substeps", result.substeps},
+                  {"computing_s", result.computing_s},
+                  {"wall_s", result.wall.count()}},
+                 garments_text(result));
+  if (context.stop.stop_requested()) throw interrupted();
+  if (result.good < order.garments)
+    throw Problem(Exit::kRefused, "FAILED_PRECONDITION", "LOAD_FAILED",
+                  fmt::format("{} of {} garments do not sit well", order.garments - result.good,
+                              order.garments));
+}
+
 // What the sessions would be: with every default filled in.
 v1::Scene checked_scene(Connection& connection, const LoadOptions& options) {
   v1::CreateSessionRequest request;
@@ -343,6 +406,7 @@ void check_stages(const LoadOrder& order) {
 void run_load(Context& context, const LoadOptions& options) {
   Page page(options.page);
   if (!options.compare.empty()) return compare(context, options.compare, page);
+  if (options.garments) return load_with_garments(context, options);
   LoadOrder order = options.order;
   check_stages(order);
   if (order.drive == Drive::kFree && options.find_limit)
@@ -444,6 +508,25 @@ void add_load(CLI::App& app, Context& context) {
   command->add_option("--compare", options->compare, "Load nothing; compare two answers to --json")
       ->type_name("BEFORE AFTER")
       ->expected(2);
+  auto* garments =
+      command
+          ->add_option(
+              "--garments", options->garments,
+              "Put on so many instead, a T-shirt or a --scene with a dressing, and say how "
+              "many an hour")
+          ->type_name("N")
+          ->check(CLI::Range(1, 100'000));
+  for (CLI::Option* other : {sessions, stages, limit}) garments->excludes(other);
+  command->add_option("--at-once", options->at_once, "Of the garments")
+      ->type_name("N")
+      ->check(CLI::Range(1, 1000))
+      ->needs(garments)
+      ->capture_default_str();
+  command->add_option("--seconds", options->seconds, "Most simulated time until one is at rest, s")
+      ->type_name("S")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->needs(garments)
+      ->capture_default_str();
   command->add_option("-o,--output", options->page, "HTML page with all of it as curves too")
       ->type_name("PATH");
   command->footer(kLoadFooter);

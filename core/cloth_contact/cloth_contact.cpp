@@ -18,7 +18,7 @@ constexpr double kWindowReach = 0.25, kLeastReach = 0.02;
 }  // namespace
 
 ClothContact::ClothContact(const Scene& scene, const LeftOut& left_out)
-    : scene_(scene), cloth_(scene.sheets, left_out), lists_(cloth_) {
+    : scene_(scene), cloth_(scene.sheets, left_out), lists_(cloth_), untangling_(cloth_) {
   place_.assign(static_cast<std::size_t>(cloth_.particles()), -1);
   forget();
 }
@@ -46,6 +46,7 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
 
   const double most_reach = kWindowReach * cloth_.thickest;
   window_ = {0, ends_frame ? 1 : std::max(1, static_cast<int>(kWindowTime / dt)), most_reach};
+  untangling_.lead(sheets, dt);
   if (candidates_.empty()) return;
   read(sheets);
   set_out();
@@ -58,6 +59,17 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
   separation_.separate(
       std::clamp(window_.reach / in_step, 1.0, static_cast<double>(window_.most_steps)), movers_);
   write(sheets);
+}
+
+void ClothContact::untangle(std::span<const MovingSheet> sheets, bool wanted) {
+  const bool was_empty = untangling_.empty();
+  untangling_.clear();
+  if (wanted) {
+    cloth_.join([&](std::size_t s) -> const Matrix3Xd& { return sheets[s].good().x; }, all_);
+    lists_.blocks().set(all_);
+    untangling_.find(lists_.blocks(), all_);
+  }
+  if (!was_empty || !untangling_.empty()) forget();
 }
 
 std::int64_t ClothContact::count_cuts(std::span<const MovingSheet> sheets) {
@@ -78,6 +90,7 @@ void ClothContact::take(const Lists& for_each_list) {
   for_each_list([&](const ClothPairs& pairs) {
     for (const auto& [particle, triangle] : pairs.corners) {
       const auto& [a, b, c] = cloth_.triangles[static_cast<std::size_t>(triangle)];
+      if (untangling_.has({particle, a, b, c})) continue;
       candidates_.push_back({{particle, a, b, c},
                              false,
                              thickness_of_corner(cloth_, particle, triangle),
@@ -86,6 +99,7 @@ void ClothContact::take(const Lists& for_each_list) {
     for (const auto& [one, other] : pairs.edges) {
       const auto& [a, b] = cloth_.edges[static_cast<std::size_t>(one)];
       const auto& [c, d] = cloth_.edges[static_cast<std::size_t>(other)];
+      if (untangling_.has({a, b, c, d})) continue;
       candidates_.push_back({{a, b, c, d},
                              true,
                              thickness_of_edges(cloth_, one, other),

@@ -5,6 +5,7 @@
 
 #include "core/cloth_contact/pair_lists.h"
 #include "core/cloth_contact/separation.h"
+#include "core/cloth_contact/untangling.h"
 #include "core/moving_sheet.h"
 
 namespace weft {
@@ -24,6 +25,9 @@ class ClothContact {
   // Sheets may be anywhere now, or be held otherwise, at the begin of a frame. Nothing that was
   // found before is used, nor kept in memory.
   void forget();
+  // Looks for cloth that has passed through cloth at the begin of a frame, or has it stay so: until
+  // the next call such pairs do not keep each other apart, but are led apart (untangling.h).
+  void untangle(std::span<const MovingSheet> sheets, bool wanted);
   // Of sheets that have taken a step of dt, s.
   void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame);
 
@@ -63,6 +67,7 @@ class ClothContact {
   std::vector<double> inverse_mass_;  // of these, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m
   Separation separation_;
+  Untangling untangling_;
   std::vector<Mover> movers_;
   std::vector<int> changed_;  // of a sheet, by its own numbers
 };

@@ -16,20 +16,15 @@ ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vect
   return count_cuts(cloth, near, all, most_told);
 }
 
-ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
-                     std::size_t most_told) {
-  std::vector<ClothCut> found;
+std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x) {
+  std::vector<ClothPair> found;
   const auto look = [&](int edges_of, int triangle) {
     const auto& [a, b, c] = cloth.triangles[static_cast<std::size_t>(triangle)];
     const auto from = static_cast<std::size_t>(edges_of);
     for (int e = cloth.first_edge[from]; e < cloth.first_edge[from + 1]; ++e) {
       const auto& [p, q] = cloth.edges[static_cast<std::size_t>(e)];
       if (p == a || p == b || p == c || q == a || q == b || q == c) continue;
-      if (!cuts(x.col(p), x.col(q), x.col(a), x.col(b), x.col(c))) continue;
-      found.push_back({static_cast<std::size_t>(cloth.sheet_of(p)),
-                       static_cast<std::size_t>(cloth.sheet_of(a)),
-                       {cloth.own_number(p), cloth.own_number(q)},
-                       {cloth.own_number(a), cloth.own_number(b), cloth.own_number(c)}});
+      if (cuts(x.col(p), x.col(q), x.col(a), x.col(b), x.col(c))) found.push_back({e, triangle});
     }
   };
   for (const BlockPair& blocks : near.meet(0)) {
@@ -38,6 +33,20 @@ ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
       look(one, other);
       look(other, one);
     });
+  }
+  return found;
+}
+
+ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
+                     std::size_t most_told) {
+  std::vector<ClothCut> found;
+  for (const auto& [edge, triangle] : find_cuts(cloth, near, x)) {
+    const auto& [p, q] = cloth.edges[static_cast<std::size_t>(edge)];
+    const auto& [a, b, c] = cloth.triangles[static_cast<std::size_t>(triangle)];
+    found.push_back({static_cast<std::size_t>(cloth.sheet_of(p)),
+                     static_cast<std::size_t>(cloth.sheet_of(a)),
+                     {cloth.own_number(p), cloth.own_number(q)},
+                     {cloth.own_number(a), cloth.own_number(b), cloth.own_number(c)}});
   }
 
   const auto told = found.begin() + static_cast<std::ptrdiff_t>(std::min(most_told, found.size()));

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/cloth_contact/near_blocks.h"
+#include "core/cloth_contact/pairs.h"
 #include "core/model/mesh.h"
 
 namespace weft {
@@ -27,7 +27,9 @@ struct ClothCuts {
 // x: positions of each sheet, (3 x particles) m.
 ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vector<Matrix3Xd>& x,
                      std::size_t most_told = 10);
-// The same of cloth at x, where its blocks are.
+// Edges and triangles that they pass through, of cloth at x, where its blocks are.
+std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x);
+// Of the same.
 ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
                      std::size_t most_told);
 

@@ -59,7 +59,13 @@ std::optional<Warning> find_tangles(const Scene& scene, const std::vector<Matrix
   const ClothCuts cuts = count_cuts(cloth, blocks, all, kMostTold);
   if (near.empty() && cuts.count == 0) return std::nullopt;
   std::string text;
-  if (cuts.count > 0) text += describe_cuts(scene, cuts) + ". What has passed through stays so. ";
+  if (cuts.count > 0) {
+    text += describe_cuts(scene, cuts) + ". ";
+    if (const double end = end_of_untangling(scene); end > 0)
+      text += join("What has passed through is led apart until ", end, " s. ");
+    else
+      text += "What has passed through stays so, unless untangle_s is given. ";
+  }
   if (!near.empty()) text += describe_near(scene, cloth, near) + ". They are pushed apart";
   return Warning{"TANGLED_START", "sheets", text};
 }

@@ -371,6 +371,10 @@ std::vector<Problem> find_problems(const Scene& scene) {
     check.speed(field + ".path", collider.path);
   }
   if (scene.dressing) check_dressing(scene, sound, check);
+  if (scene.untangle) {
+    check.number("untangle_s", *scene.untangle, 0, 1000, "s");
+    if (!scene.cloth_contact) check.problem("cloth_contact", "is false; untangle_s needs it");
+  }
   check_environment(scene.environment, check);
   check_solver(scene.solver, check);
   return check.take();

@@ -30,6 +30,13 @@ BendingLaw default_bending(Accuracy accuracy) {
   return ChoiKo{.evaluator = Evaluator::kPolynomial, .degree = 12};
 }
 
+double end_of_untangling(const Scene& scene) {
+  constexpr double kAfterDressing = 3;  // s
+  if (!scene.cloth_contact) return 0;
+  if (scene.untangle) return *scene.untangle;
+  return scene.dressing ? scene.dressing->end() + kAfterDressing : 0;
+}
+
 double most_thickness(const SheetDefinition& sheet) { return shortest_edge(sheet.shape) / 4; }
 
 double SheetDefinition::thickness_or_default() const {

@@ -175,7 +175,11 @@ struct Scene {
   Environment environment;
   SolverSettings solver;
   std::optional<Dressing> dressing;
+  std::optional<double> untangle;  // until when cloth contact leads tangled cloth apart, s
 };
+
+// If not given, that is a while after a garment is put on; without a dressing it does not, s.
+double end_of_untangling(const Scene& scene);
 
 struct Problem {
   std::string field;    // path in a scene file, "sheets[0].grid.rows"

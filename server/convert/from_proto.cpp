@@ -132,6 +132,7 @@ Scene Reader::scene(const v1::Scene& from) {
     scene.colliders.back().name = collider_names[static_cast<std::size_t>(i)];
   }
   scene.cloth_contact = from.cloth_contact();
+  if (from.has_untangle_s()) scene.untangle = from.untangle_s();
   if (from.has_dressing()) scene.dressing = dressing(from.dressing(), scene.sheets);
   scene.environment = environment(from.environment());
   scene.solver = solver(from.solver());

@@ -188,6 +188,7 @@ void set(v1::Scene* to, const Scene& from, const std::vector<Textile>& textiles,
     *added->mutable_path() = to_proto(collider.path);
   }
   to->set_cloth_contact(from.cloth_contact);
+  if (from.untangle) to->set_untangle_s(*from.untangle);
   if (from.dressing) set(to->mutable_dressing(), *from.dressing, from.sheets);
   set(to->mutable_environment(), from.environment);
   set(to->mutable_solver(), from.solver);

@@ -47,7 +47,7 @@ bool Session::begin_at(const SavedSession& saved) {
   }
   for (const auto& [request, outcome] : from.answers) answers_.remember(request, outcome);
   const Simulation& simulation = timeline_.simulation;
-  const auto frame = timeline_.make_frame(timeline_.repairs_of_frame(, false));
+  const auto frame = timeline_.make_frame(timeline_.repairs_of_frame(), false);
   std::lock_guard lock(mutex_);
   audience_.begin(frame);
   repairs_ = simulation.repairs();

@@ -53,6 +53,19 @@ TEST_F(LoadTest, EverySubscriberReceivesEveryFrameOnceHoweverSessionsAdvance) {
   }
 }
 
+TEST_F(LoadTest, GarmentsArePutOnAndEachVerdictIsCounted) {
+  const Outcome load = weft({"load", "--scene", scene_file(small_scene()), "--garments", "3",
+                             "--at-once", "2", "--seconds", "0.1", "--json"});
+  EXPECT_EQ(load.exit, 1);
+  EXPECT_THAT(load.err, HasSubstr("3 of 3 garments do not sit well"));
+  EXPECT_EQ(load.json()["garments"], 3);
+  EXPECT_EQ(load.json()["good"], 0);
+  EXPECT_EQ(load.json()["faults"]["NOT_AT_REST"], 3);
+  EXPECT_TRUE(load.json()["errors"].empty());
+  EXPECT_GT(load.json()["garments_per_hour"], 0);
+  EXPECT_TRUE(ask({"session", "list"})["sessions"].empty());
+}
+
 client::LoadResult apply_at_once(const std::string& address, client::LoadOrder& order) {
   order.ramp = milliseconds(0);
   const auto connection = client::Connection::to(address, {});

@@ -338,7 +338,8 @@ class Plain(unittest.TestCase):
             tube.save(f"{directory}/tube.json")
             worn = self.server.drape(weft.Pattern.load(f"{directory}/tube.json"), [pole],
                                      weft.Textile.preset("jersey_interlock"), edge_m=0.02,
-                                     accuracy="DRAFT", seconds=5)
+                                     deflate_m=0.002, accuracy="DRAFT", seconds=5)
+        self.assertEqual(worn.session.get().scene.dressing.deflate_m, 0.002)
         self.assertTrue(worn.verdict.dressed)
         self.assertEqual(worn.verdict.particles_inside, 0)
         self.assertEqual(worn.frame.number, worn.session.get().frame)

@@ -136,6 +136,8 @@ v1::Scene full_scene() {
     add_path(&collider);
   }
 
+  scene.set_cloth_contact(true);
+  scene.set_untangle_s(0.5);
   v1::Dressing* dressing = scene.mutable_dressing();
   dressing->set_close_s(0.1);
   dressing->set_settle_s(0.05);

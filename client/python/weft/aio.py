@@ -178,11 +178,12 @@ class Server:
         textile: Textile,
         *,
         edge_m: float | None = None,
+        deflate_m: float | None = None,
         accuracy: Accuracy | None = None,
         seconds: float = 20,
     ) -> "Drape":
         built = await self.build_garment(pattern, edge_m)
-        scene = calls.garment_scene(built, bodies, textile, accuracy)
+        scene = calls.garment_scene(built, bodies, textile, deflate_m, accuracy)
         session = await self.create_session(scene)
         last = calls.frames_within((await session.get()).scene, seconds)
         await session.run(until_rest=True, until_frame=last)

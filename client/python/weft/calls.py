@@ -363,14 +363,17 @@ def garment_scene(
     built: garment_pb2.BuildGarmentResponse,
     bodies: Iterable[Collider],
     textile: Textile,
+    deflate_m: float | None,
     accuracy: Accuracy | None,
 ) -> Scene:
     sheet = Sheet.from_proto(built.sheet)
     if textile.damping_kg_per_s is None and textile.damping_ratio is None:
         textile = dataclasses.replace(textile, damping_kg_per_s=2e-3)  # rests within some seconds
     sheet.name, sheet.textile = "garment", textile
+    dressing = Dressing.from_proto(built.dressing)
+    dressing.deflate_m = deflate_m
     return Scene([sheet], list(bodies), solver=SolverSettings(accuracy=accuracy),
-                 cloth_contact=True, dressing=Dressing.from_proto(built.dressing))
+                 cloth_contact=True, dressing=dressing)
 
 
 def frames_within(scene: Any, time_s: float) -> int:

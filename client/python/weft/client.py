@@ -209,17 +209,20 @@ class Server:
         textile: Textile,
         *,
         edge_m: float | None = None,
+        deflate_m: float | None = None,
         accuracy: Accuracy | None = None,
         seconds: float = 20,
     ) -> "Drape":
         """Puts a garment of measured textiles on bodies, and waits until it hangs at rest, for so
         many simulated seconds at most.
 
+        deflate_m  by how much bodies are smaller while seams close: 0.02 parts thighs for trousers
+
         Seams close around the bodies, then weight comes in, as `weft drape` has it. The session has
         all frames from the flat panels on, and stays until it is deleted.
         """
         built = self.build_garment(pattern, edge_m)
-        scene = calls.garment_scene(built, bodies, textile, accuracy)
+        scene = calls.garment_scene(built, bodies, textile, deflate_m, accuracy)
         session = self.create_session(scene)
         last = calls.frames_within((session.get()).scene, seconds)
         session.run(until_rest=True, until_frame=last)

@@ -470,6 +470,7 @@ class Scene(Value):
     solver: SolverSettings | None = None
     cloth_contact: bool = False
     dressing: Dressing | None = None
+    untangle_s: float | None = None
 
     def to_json(self) -> str:
         """What stands in a scene file."""

@@ -1,0 +1,102 @@
+#include "core/cloth_contact/untangling.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "core/cloth_contact/cuts.h"
+
+namespace weft {
+
+void Untangling::clear() {
+  pairs_.clear();
+  at_cut_.clear();
+}
+
+void Untangling::find(NearBlocks& near, const Matrix3Xd& x) {
+  clear();
+  const std::vector<ClothPair> cuts = find_cuts(cloth_, near, x);
+  if (cuts.empty()) return;
+  Around around(static_cast<std::size_t>(cloth_.particles()));
+  for (std::size_t t = 0; t < cloth_.triangles.size(); ++t)
+    for (const int i : cloth_.triangles[t])
+      around[static_cast<std::size_t>(i)].push_back(static_cast<int>(t));
+  at_cut_.resize(around.size());
+  for (const auto& [edge, triangle] : cuts) add(edge, triangle, around, x);
+}
+
+bool Untangling::has(const std::array<int, 4>& particles) const {
+  return !at_cut_.empty() && std::ranges::all_of(particles, [&](int i) {
+    return at_cut_[static_cast<std::size_t>(i)];
+  });
+}
+
+void Untangling::add(int edge, int triangle, const Around& around, const Matrix3Xd& x) {
+  constexpr double kSpeed = 0.2;     // m/s
+  constexpr double kHalfTurn = 0.2;  // of the line where the speed is half of that
+  const auto& [p, q] = cloth_.edges[static_cast<std::size_t>(edge)];
+  const std::array<int, 3> corners = cloth_.triangles[static_cast<std::size_t>(triangle)];
+  const auto& [a, b, c] = corners;
+  const Vector3d along = x.col(q) - x.col(p), ab = x.col(b) - x.col(a), ac = x.col(c) - x.col(a);
+  const Vector3d area = ab.cross(ac), normal = area.normalized();
+  const double rise = along.dot(normal);
+  if (rise == 0) return;  // but for rounding
+
+  // the ways of the line from here into the triangles at the edge
+  Vector3d line = Vector3d::Zero();
+  const auto at_cut = [&](int i) { at_cut_[static_cast<std::size_t>(i)] = true; };
+  std::ranges::for_each(corners, at_cut);
+  for (const int t : around[static_cast<std::size_t>(p)]) {
+    const auto& own = cloth_.triangles[static_cast<std::size_t>(t)];
+    if (std::ranges::find(own, q) == own.end()) continue;
+    std::ranges::for_each(own, at_cut);
+    for (const int tip : own) {
+      if (tip == p || tip == q) continue;
+      const Vector3d out = along.cross(x.col(tip) - x.col(p)), way = normal.cross(out).normalized();
+      line += way.dot(out.cross(along)) < 0 ? -way : way;
+    }
+  }
+  // along which an edge leaves the plane of the triangle shortens the line too
+  const Vector3d way = line - along.dot(line) / rise * normal;
+  const double turn = way.norm();
+  if (turn == 0) return;
+
+  const double share = std::clamp((x.col(a) - x.col(p)).dot(normal) / rise, 0.0, 1.0);
+  const Vector3d at = x.col(p) + share * along - x.col(a);
+  const double v = at.cross(ac).dot(area) / area.squaredNorm(),
+               w = ab.cross(at).dot(area) / area.squaredNorm();
+  pairs_.push_back({{p, q, a, b, c},
+                    {1 - share, share, v + w - 1, -v, -w},
+                    way / turn,
+                    kSpeed * turn / std::hypot(turn, kHalfTurn)});
+}
+
+void Untangling::lead(std::span<MovingSheet> sheets, double dt) const {
+  for (const Pair& pair : pairs_) {
+    double speed = 0, moves = 0;
+    std::array<double, 5> share{};
+    Matrix3Xd x(3, 1), d(3, 1);
+    const auto sheet_of = [&](int particle) -> MovingSheet& {
+      return sheets[static_cast<std::size_t>(cloth_.sheet_of(particle))];
+    };
+    for (std::size_t n = 0; n < share.size(); ++n) {
+      const MovingSheet& sheet = sheet_of(pair.particle[n]);
+      const int own = cloth_.own_number(pair.particle[n]);
+      sheet.solver->read({&own, 1}, x, d);
+      speed += pair.weight[n] * pair.way.dot(d.col(0)) / dt;
+      share[n] = pair.weight[n] * sheet.dynamics.inverse_mass[own];
+      moves += pair.weight[n] * share[n];
+    }
+    const double missing = pair.speed - speed;
+    if (missing <= 0 || moves == 0) continue;
+    x.setZero();
+    for (std::size_t n = 0; n < share.size(); ++n) {
+      if (share[n] == 0) continue;
+      const int own = cloth_.own_number(pair.particle[n]);
+      d = share[n] / moves * missing * dt * pair.way;
+      sheet_of(pair.particle[n]).solver->displace({&own, 1}, x, d);
+    }
+  }
+}
+
+}  // namespace weft

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "core/cloth_contact/near_blocks.h"
+#include "core/moving_sheet.h"
+
+namespace weft {
+
+// Leads apart cloth that has passed through cloth. Where an edge passes through a triangle, both
+// are moved so that the line along which the two surfaces meet becomes shorter (Volino and
+// Magnenat-Thalmann 2006), until there is none. That asks for no inside: borders, and lines that
+// do not close, are led apart too; but not a strip through a slit, or what is linked.
+class Untangling {
+ public:
+  explicit Untangling(const Cloth& cloth) : cloth_(cloth) {}
+
+  // Looks for cuts at x, (3 x particles) m, where `near` has its boxes.
+  void find(NearBlocks& near, const Matrix3Xd& x);
+  void clear();
+  bool empty() const { return pairs_.empty(); }
+  // Whether all of these particles are at cuts: what they are to keep apart may be on wrong sides.
+  bool has(const std::array<int, 4>& particles) const;
+  // Has edges and triangles move apart in the step to come, which takes dt, s. What one is given is
+  // taken from the other.
+  void lead(std::span<MovingSheet> sheets, double dt) const;
+
+ private:
+  // An edge and a triangle that it passes through.
+  struct Pair {
+    std::array<int, 5> particle;   // ends of the edge, corners of the triangle
+    std::array<double, 5> weight;  // of its motion away from the triangle, where it passes through
+    Vector3d way;                  // 1
+    double speed;                  // m/s
+  };
+
+  using Around = std::vector<std::vector<int>>;  // triangles of each particle
+  void add(int edge, int triangle, const Around& around, const Matrix3Xd& x);
+
+  const Cloth& cloth_;
+  std::vector<Pair> pairs_;
+  std::vector<bool> at_cut_;  // of each particle; or empty
+};
+
+}  // namespace weft

@@ -1,0 +1,186 @@
+#include "core/cloth_contact/untangling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/cloth_contact/cuts.h"
+#include "core/simulation.h"
+#include "core/triangles/cut.h"
+#include "tests/support/core/scenes.h"
+
+namespace weft::testing {
+namespace {
+
+SheetDefinition swatch(const char* name) {
+  SheetDefinition sheet;
+  sheet.name = name;
+  sheet.shape = complete(triangle_mesh(cut_rectangle(Cut::kAlternating, 0.1, 0.1, 0.01)));
+  sheet.textile.model = MeasuredTextile{.areal_density = 0.2,
+                                        .tensile_warp = 200,
+                                        .tensile_weft = 200,
+                                        .shear = 20,
+                                        .bend_rigidity_warp = 1e-5,
+                                        .bend_rigidity_weft = 1e-5};
+  sheet.bending = Isometric{};
+  return sheet;
+}
+
+// Weightless sheets.
+Scene weightless(const std::vector<SheetDefinition>& sheets, std::optional<double> untangle) {
+  Scene scene;
+  scene.sheets = sheets;
+  scene.environment.gravity.setZero();
+  scene.cloth_contact = true;
+  scene.untangle = untangle;
+  return scene;
+}
+
+// Two swatches, each with a corner through the other.
+Scene crossing(std::optional<double> untangle) {
+  SheetDefinition one = swatch("one"), other = swatch("other");
+  Matrix3Xd x = start_positions(other);
+  const Eigen::Matrix3d tilt = Eigen::AngleAxisd(0.7, Vector3d::UnitZ()).toRotationMatrix();
+  for (auto at : x.colwise()) at = (tilt * at + Vector3d(0.043, -0.021, 0.047)).eval();
+  other.start_positions = values(x);
+  return weightless({one, other}, untangle);
+}
+
+// A strip that is rolled up so far that an end of it has gone through what lies under it.
+Scene rolled(std::optional<double> untangle) {
+  SheetDefinition sheet = swatch("roll");
+  sheet.shape = complete(triangle_mesh(cut_rectangle(Cut::kAlternating, 0.2, 0.03, 0.01)));
+  constexpr double kRadius = 0.025;
+  Matrix3Xd x = start_positions(sheet);
+  for (auto at : x.colwise()) {
+    const double angle = at.x() / kRadius, radius = kRadius * (1 - 0.03 * angle);
+    at << radius * std::sin(angle), -radius * std::cos(angle), at.z();
+    if (angle > 6.6) at.y() -= 0.35 * kRadius;
+  }
+  sheet.start_positions = values(x);
+  return weightless({sheet}, untangle);
+}
+
+// A strip that hangs through the middle of a swatch.
+Scene through_a_slit(double untangle) {
+  SheetDefinition sheet = swatch("sheet"), strip = swatch("strip");
+  strip.shape = complete(triangle_mesh(cut_rectangle(Cut::kAlternating, 0.1, 0.03, 0.01)));
+  Matrix3Xd x = start_positions(strip);
+  for (auto at : x.colwise()) at = Vector3d(0.052, at.x() - 0.047, at.z() + 0.033);
+  strip.start_positions = values(x);
+  return weightless({sheet, strip}, untangle);
+}
+
+std::int64_t cuts_of(const Simulation& simulation) { return *simulation.stats().cloth_cuts; }
+
+void go_on(Simulation& simulation, int frames) {
+  for (int i = 0; i < frames; ++i) ASSERT_TRUE(simulation.advance_frame()) << simulation.failure();
+}
+
+Vector3d momentum_of(const Simulation& simulation) {
+  const Scene& scene = simulation.scene();
+  const Matrix3Xd v = velocities(simulation);
+  Vector3d sum = Vector3d::Zero();
+  Eigen::Index first = 0;
+  for (const SheetDefinition& sheet : scene.sheets) {
+    const VectorXd mass = make_mesh(sheet).mass;
+    sum += v.middleCols(first, mass.size()) * mass;
+    first += mass.size();
+  }
+  return sum;
+}
+
+TEST(Untangling, SwatchesThatCrossComeApart) {
+  Simulation untangled(crossing(10)), tangled(crossing(std::nullopt));
+  EXPECT_GT(cuts_of(untangled), 10);
+  go_on(untangled, 60);
+  go_on(tangled, 60);
+  EXPECT_EQ(cuts_of(untangled), 0);
+  EXPECT_GT(cuts_of(tangled), 10);
+}
+
+TEST(Untangling, ARollThatHasGoneThroughItselfComesApart) {
+  Simulation simulation(rolled(10));
+  EXPECT_GT(cuts_of(simulation), 0);
+  go_on(simulation, 60);
+  EXPECT_EQ(cuts_of(simulation), 0);
+}
+
+TEST(Untangling, KeepsMomentum) {
+  Simulation simulation(crossing(10));
+  double most = 0;
+  for (int i = 0; i < 20; ++i) {
+    go_on(simulation, 1);
+    EXPECT_LT(momentum_of(simulation).norm(), 1e-9);
+    most = std::max(most, velocities(simulation).colwise().norm().maxCoeff());
+  }
+  EXPECT_GT(most, 0.05);
+}
+
+TEST(Untangling, GoesOnFromASnapshotWithTheSameBits) {
+  Simulation simulation(crossing(10));
+  go_on(simulation, 7);
+  ASSERT_GT(cuts_of(simulation), 0);
+  Simulation restored(crossing(10));
+  ASSERT_TRUE(restored.restore(simulation.snapshot()));
+  simulation.release_memory();
+  go_on(simulation, 20);
+  go_on(restored, 20);
+  EXPECT_EQ(positions(simulation), positions(restored));
+}
+
+TEST(Untangling, ChangesNoBitWhereNothingHasPassedThrough) {
+  const auto falling = [](std::optional<double> untangle) {
+    Scene scene = crossing(untangle);
+    SheetDefinition& other = scene.sheets[1];
+    other.start_positions = {};
+    other.origin = {0.03, 0.01, 0.03};
+    other.start_velocities =
+        values(Vector3d(0.1, -0.5, 0).replicate(1, other.particle_count()).eval());
+    return scene;
+  };
+  Simulation with(falling(10)), without(falling(std::nullopt));
+  go_on(with, 20);
+  go_on(without, 20);
+  EXPECT_EQ(positions(with), positions(without));
+}
+
+TEST(Untangling, SaysWhatCouldNotBeLedApart) {
+  Simulation simulation(through_a_slit(0.2));
+  go_on(simulation, 30);
+  EXPECT_GT(cuts_of(simulation), 0);
+  const Verdict verdict = simulation.verdict();
+  ASSERT_FALSE(verdict.faults.empty());
+  bool told = false;
+  for (const Fault& fault : verdict.faults)
+    told = told || (fault.code == "CLOTH_CUTS" &&
+                    fault.message.ends_with("which could not be led apart within 0.2 s"));
+  EXPECT_TRUE(told);
+}
+
+TEST(Untangling, IsForScenesWithClothContact) {
+  Scene scene = crossing(10);
+  for (const Problem& problem : find_problems(scene))
+    ADD_FAILURE() << problem.field << " " << problem.message;
+  scene.cloth_contact = false;
+  ASSERT_EQ(find_problems(scene).size(), 1U);
+  EXPECT_EQ(find_problems(scene)[0].field, "cloth_contact");
+  scene.cloth_contact = true;
+  scene.untangle = -1;
+  ASSERT_EQ(find_problems(scene).size(), 1U);
+  EXPECT_EQ(find_problems(scene)[0].field, "untangle_s");
+}
+
+TEST(Untangling, IsPartOfADressing) {
+  Scene scene = crossing(std::nullopt);
+  EXPECT_EQ(end_of_untangling(scene), 0);
+  scene.dressing.emplace();
+  scene.dressing->close = 2;
+  scene.dressing->settle = 0.5;
+  EXPECT_DOUBLE_EQ(end_of_untangling(scene), 5.5);
+  scene.untangle = 0;
+  EXPECT_EQ(end_of_untangling(scene), 0);
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -170,7 +170,7 @@ std::string known_asset() { return square_mesh(1).SerializeAsString(); }
 
 std::vector<std::string> known_requests(const std::string& type) {
   static const std::multimap<std::string, std::string> known = {
-      {"CreateSessionRequest", "refused_warnings: 'TETHERS_TAUT'"},  // its scene is full_scene()
+      {"CreateSessionRequest", "refused_warnings: 'MESH_DEPENDENT'"},  // its scene is full_scene()
       {"GetSessionRequest", "name: 'sessions/it'"},
       {"ListSessionsRequest", "page_size: 5 page_token: 'it'"},
       {"DeleteSessionRequest", "name: 'sessions/it' allow_missing: true"},

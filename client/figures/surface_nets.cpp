@@ -18,6 +18,8 @@ class NetLattice {
       size_[axis] = static_cast<int>(std::ceil((high[k] - low[k]) / cell)) + 1;
     }
     values_.resize(static_cast<std::size_t>(size_[0] * size_[1] * size_[2]));
+    for (std::size_t axis = 0; axis < 3; ++axis) blocks_[axis] = (size_[axis] - 1) / kBlock + 1;
+    side_.resize(static_cast<std::size_t>(blocks_[0] * blocks_[1] * blocks_[2]));
     for (int z = 0; z < size_[2]; z += kBlock)
       for (int y = 0; y < size_[1]; y += kBlock)
         for (int x = 0; x < size_[0]; x += kBlock) set_block(function, {x, y, z});
@@ -52,18 +54,41 @@ class NetLattice {
     const double least = 2 * (std::sqrt(3.0) * kHalf + 1) * cell_;
     const double middle =
         function(place(Vector3d(first[0], first[1], first[2]) + Vector3d::Constant(kHalf)));
+    const bool far = std::abs(middle) > least;
+    side(first) = !far ? 0 : middle < 0 ? -1 : 1;
     for (int z = first[2]; z < std::min(first[2] + kBlock, size_[2]); ++z)
       for (int y = first[1]; y < std::min(first[1] + kBlock, size_[1]); ++y)
         for (int x = first[0]; x < std::min(first[0] + kBlock, size_[0]); ++x)
-          values_[index({x, y, z})] =
-              std::abs(middle) > least ? middle : function(place(Vector3d(x, y, z)));
+          values_[index({x, y, z})] = far ? middle : function(place(Vector3d(x, y, z)));
   }
 
+  // Of the block of a corner.
+  signed char& side(const NetCorner& at) {
+    const int block = (at[2] / kBlock * blocks_[1] + at[1] / kBlock) * blocks_[0] + at[0] / kBlock;
+    return side_[static_cast<std::size_t>(block)];
+  }
+
+  // Those that the surface may cross.
   template <class F>
-  void for_each_cell(const F& visit) const {
+  void for_each_cell(const F& visit) {
     for (int z = 0; z + 1 < size_[2]; ++z)
       for (int y = 0; y + 1 < size_[1]; ++y)
-        for (int x = 0; x + 1 < size_[0]; ++x) visit(NetCorner{x, y, z});
+        for (int x = 0; x + 1 < size_[0]; ++x) {
+          // a cell whose corners are all in blocks on one side, and with it those up to the next
+          // block
+          if (x % kBlock == 0 || x % kBlock == kBlock - 1) {
+            const int last = std::min(x + 1, size_[0] - 1), own = side({x, y, z});
+            bool alike = own != 0;
+            for (const int at : {x, last})
+              for (const int beside : {y, y + 1})
+                for (const int above : {z, z + 1}) alike &= side({at, beside, above}) == own;
+            if (alike) {
+              if (x % kBlock == 0) x += kBlock - 2;
+              continue;
+            }
+          }
+          visit(NetCorner{x, y, z});
+        }
   }
 
   // Two sheets that meet in a face of a cell, inside at two corners opposite one another, would
@@ -79,6 +104,7 @@ class NetLattice {
           continue;
         const NetCorner& outside = first ? one : at;
         values_[index(outside)] = -0.01 * cell_;
+        side(outside) = 0;
         found = true;
       }
     });
@@ -125,9 +151,10 @@ class NetLattice {
 
   Vector3d low_;
   double cell_;
-  std::array<int, 3> size_{};
+  std::array<int, 3> size_{}, blocks_{};
   std::vector<double> values_;
-  std::vector<int> vertex_;  // of each cell, by its first corner
+  std::vector<signed char> side_;  // of each block: -1 or 1 where it is far inside or outside
+  std::vector<int> vertex_;        // of each cell, by its first corner
   FigureMesh mesh_;
 };
 

@@ -74,8 +74,7 @@ class NetLattice {
     for (int z = 0; z + 1 < size_[2]; ++z)
       for (int y = 0; y + 1 < size_[1]; ++y)
         for (int x = 0; x + 1 < size_[0]; ++x) {
-          // a cell whose corners are all in blocks on one side, and with it those up to the next
-          // block
+          // where all corners are in blocks on one side, as for the cells up to the next block
           if (x % kBlock == 0 || x % kBlock == kBlock - 1) {
             const int last = std::min(x + 1, size_[0] - 1), own = side({x, y, z});
             bool alike = own != 0;

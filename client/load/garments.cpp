@@ -1,6 +1,7 @@
 #include "client/load/garments.h"
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <future>
 #include <mutex>

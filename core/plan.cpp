@@ -316,22 +316,24 @@ void warn_of_body(std::size_t index, const Body& body, Plan& plan) {
               "cell_m")});
 }
 
-void warn_of_start_inside(const Scene& scene, std::size_t index, Plan& plan) {
-  const Contacts contacts(std::span(&scene.colliders[index], 1), {}, 0, 0, 0, 0);
-  for (const SheetDefinition& sheet : scene.sheets) {
-    const Matrix3Xd x = start_positions(sheet);
-    std::vector<bool> held(static_cast<std::size_t>(x.cols()));
-    for (const Pin& pin : sheet.pins)
-      for (const int i : pin.particles) held[static_cast<std::size_t>(i)] = true;
-    int inside = 0, first = 0;
-    for (Eigen::Index i = 0; i < x.cols(); ++i)
-      if (!held[static_cast<std::size_t>(i)] && contacts.gap(x.col(i)) < 0 && inside++ == 0)
-        first = static_cast<int>(i);
-    if (inside > 0)
-      plan.warnings.push_back(
-          {"STARTS_INSIDE", join("colliders[", index, "]"),
-           join(inside, " particles of sheet \"", sheet.name, "\" start inside, the first of them ",
-                first, ": they are pushed out at ", Contacts::kOutward, " m/s")});
+void warn_of_start_inside(const Scene& scene, const std::vector<PlannedSheet>& planned,
+                          Plan& plan) {
+  std::vector<Matrix3Xd> starts;
+  if (!scene.colliders.empty())
+    for (const SheetDefinition& sheet : scene.sheets) starts.push_back(start_positions(sheet));
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c) {
+    const Contacts contacts(std::span(&scene.colliders[c], 1), {}, 0, 0, 0, 0);
+    for (std::size_t s = 0; s < starts.size(); ++s) {
+      int inside = 0, first = 0;
+      for (Eigen::Index i = 0; i < starts[s].cols(); ++i)
+        if (planned[s].inverse_mass[i] != 0 && contacts.gap(starts[s].col(i)) < 0 && inside++ == 0)
+          first = static_cast<int>(i);
+      if (inside > 0)
+        plan.warnings.push_back({"STARTS_INSIDE", join("colliders[", c, "]"),
+                                 join(inside, " particles of sheet \"", scene.sheets[s].name,
+                                      "\" start inside, the first of them ", first,
+                                      ": they are pushed out at ", Contacts::kOutward, " m/s")});
+    }
   }
 }
 
@@ -353,7 +355,7 @@ void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
   for (std::size_t c = 0; c < scene.colliders.size(); ++c)
     if (const auto* body = std::get_if<SharedBody>(&scene.colliders[c].shape))
       warn_of_body(c, **body, plan);
-  for (std::size_t c = 0; c < scene.colliders.size(); ++c) warn_of_start_inside(scene, c, plan);
+  warn_of_start_inside(scene, planned, plan);
   for (std::size_t s = 0; s < planned.size(); ++s) {
     if (std::holds_alternative<Triangles>(scene.sheets[s].shape)) {
       warn_of_triangles(scene, s, planned[s], steps[s].limiting_particle, plan);

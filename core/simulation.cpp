@@ -439,8 +439,8 @@ double Simulation::kinetic_energy() const {
 }
 
 std::optional<std::int64_t> Simulation::cloth_cuts() const {
+  if (!state_->scene.cloth_contact) return std::nullopt;
   state_->restore_memory();
-  if (!state_->cloth_contact) return std::nullopt;
   return state_->cloth_contact->count_cuts(state_->sheets);
 }
 

@@ -42,7 +42,7 @@ enum class BendKind {
   kIsometric
 };
 
-// As large as a value.
+// Which lane of a vector; as large as its values.
 template <class T>
 using LaneNumber = std::conditional_t<sizeof(T) == 4, std::int32_t, std::int64_t>;
 
@@ -86,7 +86,7 @@ struct SweepLaw {
   // all bits, else none: where a column of the halo exists, and which lanes of the vector that it
   // continues it holds
   AlignedArray<T> halo_exists, halo_folds;  // (2 kHalo x lanes)
-  // which lanes of the vector that it continues it holds, and the other way round
+  // the lane of that vector which each of its lanes continues, and the other way round
   AlignedArray<LaneNumber<T>> halo_from, halo_to;  // (2 kHalo x lanes)
 };
 

@@ -219,15 +219,8 @@ std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order) {
   if (format.strain())
     message.set_strain(bytes_of(strains_of(frame.positions, order.sheets), 3, format.encoding(),
                                 format.grid_step_m()));
-  if (format.pressure())
-    message.set_pressure_pa(
-        arrays.bytes(frame.meter ? frame.meter->pressures(frame.scene, frame.positions, frame.time)
-                                 : frame.pressures,
-                     kPressureSteps));
-  if (format.clearance())
-    message.set_clearance_m(
-        arrays.bytes(frame.meter ? frame.meter->clearances(frame.scene, frame.positions, frame.time)
-                                 : frame.clearances));
+  if (format.pressure()) message.set_pressure_pa(arrays.bytes(pressures_of(frame), kPressureSteps));
+  if (format.clearance()) message.set_clearance_m(arrays.bytes(clearances_of(frame)));
   if (format.stats()) {
     v1::FrameStats* stats = message.mutable_stats();
     const Deformation deformation = deformation_of(frame);

@@ -27,4 +27,14 @@ Deformation deformation_of(const Frame& frame) {
   return frame.meter->deformation(frame.scene, frame.positions, frame.time);
 }
 
+std::vector<double> pressures_of(const Frame& frame) {
+  if (!frame.meter) return frame.pressures;
+  return frame.meter->pressures(frame.scene, frame.positions, frame.time);
+}
+
+std::vector<double> clearances_of(const Frame& frame) {
+  if (!frame.meter) return frame.clearances;
+  return frame.meter->clearances(frame.scene, frame.positions, frame.time);
+}
+
 }  // namespace weft

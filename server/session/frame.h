@@ -64,7 +64,9 @@ struct Frame {
   }
 };
 
-// As it came with the frame, or computed now.
+// As they came with the frame, or computed now.
 Deformation deformation_of(const Frame& frame);
+std::vector<double> pressures_of(const Frame& frame);
+std::vector<double> clearances_of(const Frame& frame);
 
 }  // namespace weft

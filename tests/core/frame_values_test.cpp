@@ -18,12 +18,7 @@ SheetDefinition patch(const SheetShape& shape) {
   SheetDefinition sheet;
   sheet.name = "patch";
   sheet.shape = shape;
-  sheet.textile.model = MeasuredTextile{.areal_density = kPatchDensity,
-                                        .tensile_warp = 200,
-                                        .tensile_weft = 200,
-                                        .shear = 20,
-                                        .bend_rigidity_warp = 1e-5,
-                                        .bend_rigidity_weft = 1e-5};
+  sheet.textile.model = light_textile(kPatchDensity);
   sheet.bending = Isometric{};
   sheet.skin = 0.001;
   sheet.origin = {0, 0.0011, 0};

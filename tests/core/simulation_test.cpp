@@ -1,6 +1,6 @@
 #include "core/simulation.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 #include <malloc.h>
 
 #include <cmath>
@@ -135,7 +135,10 @@ TEST(Simulation, APlanNamesWhatRunsAndWhatIsSkippedAndWhy) {
 std::vector<std::string> warnings(const Scene& scene) {
   std::vector<std::string> codes;
   const Simulation simulation(scene);
-  for (const Warning& warning : simulation.plan().warnings) codes.push_back(warning.code);
+  for (const Warning& warning : simulation.plan().warnings) {
+    codes.push_back(warning.code);
+    EXPECT_THAT(warning_codes(), ::testing::Contains(warning.code));
+  }
   return codes;
 }
 

@@ -16,12 +16,7 @@ SheetDefinition swatch(const char* name) {
   SheetDefinition sheet;
   sheet.name = name;
   sheet.shape = complete(triangle_mesh(cut_rectangle(Cut::kAlternating, 0.1, 0.1, 0.01)));
-  sheet.textile.model = MeasuredTextile{.areal_density = 0.2,
-                                        .tensile_warp = 200,
-                                        .tensile_weft = 200,
-                                        .shear = 20,
-                                        .bend_rigidity_warp = 1e-5,
-                                        .bend_rigidity_weft = 1e-5};
+  sheet.textile.model = light_textile(0.2);
   sheet.bending = Isometric{};
   return sheet;
 }

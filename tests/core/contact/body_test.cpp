@@ -1,6 +1,6 @@
 #include "core/contact/body.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
@@ -243,6 +243,7 @@ TEST(Bodies, GiveTheSameBitsAfterASnapshot) {
 }
 
 bool warns(const Simulation& simulation, const std::string& code) {
+  EXPECT_THAT(warning_codes(), ::testing::Contains(code));
   const auto& warnings = simulation.plan().warnings;
   return std::any_of(warnings.begin(), warnings.end(),
                      [&](const Warning& each) { return each.code == code; });

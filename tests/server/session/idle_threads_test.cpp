@@ -119,12 +119,7 @@ TEST(IdleThreads, DoNotChangeTheFramesOfALargeGrid) {
 TEST(IdleThreads, DoNotChangeTheFramesOfManyTriangles) {
   SheetDefinition sheet = flat_sheet(2, 2);
   sheet.shape = complete(triangle_mesh(square(Cut::kAlternating, 1, 1.0 / 90)));
-  sheet.textile.model = MeasuredTextile{.areal_density = 0.15,
-                                        .tensile_warp = 200,
-                                        .tensile_weft = 200,
-                                        .shear = 20,
-                                        .bend_rigidity_warp = 1e-5,
-                                        .bend_rigidity_weft = 1e-5};
+  sheet.textile.model = light_textile(0.15);
   sheet.bending = Isometric{};
   expect_same_frames_by_many_threads(sheet);
 }

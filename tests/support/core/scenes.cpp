@@ -11,6 +11,15 @@ Textile paper_textile(double bend) {
           0.3};
 }
 
+MeasuredTextile light_textile(double areal_density) {
+  return {.areal_density = areal_density,
+          .tensile_warp = 200,
+          .tensile_weft = 200,
+          .shear = 20,
+          .bend_rigidity_warp = 1e-5,
+          .bend_rigidity_weft = 1e-5};
+}
+
 SheetDefinition flat_sheet(int rows, int columns, double spacing) {
   SheetDefinition sheet;
   sheet.name = "sheet";

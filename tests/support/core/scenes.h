@@ -10,6 +10,9 @@ namespace weft::testing {
 // The paper's textile on a mesh: 1 g, k = 2000 N/m, k_d = 2e-4 kg/s.
 Textile paper_textile(double bend = 1e-5);
 
+// A soft one for triangles: 200 N/m, 20 N/m in shear, 1e-5 N m.
+MeasuredTextile light_textile(double areal_density);
+
 // A flat sheet of the paper's textile at the origin.
 SheetDefinition flat_sheet(int rows, int columns, double spacing = 1.0 / 30);
 

@@ -201,6 +201,13 @@ v1::Session Connection::get_session(const std::string& name) {
   return call(&v1::SessionService::Stub::GetSession, request);
 }
 
+void Connection::relax(const std::string& session) {
+  v1::ApplyActionsRequest request;
+  request.set_name(session);
+  request.add_actions()->mutable_relax();
+  call(&v1::SessionService::Stub::ApplyActions, request);
+}
+
 bool Connection::is_serving() {
   grpc::GenericStub stub(channel_);
   grpc::ClientContext context;

@@ -73,6 +73,7 @@ class Connection {
   }
 
   v1::Session get_session(const std::string& name);  // "sessions/flag"
+  void relax(const std::string& session);            // see weft.v1.Relax
   // Whether the server takes calls, as its gRPC health service says.
   bool is_serving();
   v1::SessionService::Stub& sessions() {

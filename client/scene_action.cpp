@@ -64,6 +64,10 @@ int particle_number(const ParticlePlace& place, const v1::Sheet& sheet) {
 
 v1::Action to_action(const SceneAction& action, const v1::Scene& scene) {
   v1::Action to;
+  if (action.kind == "relax") {
+    to.mutable_relax();
+    return to;
+  }
   if (action.kind == "move_collider") {
     v1::MoveCollider* move = to.mutable_move_collider();
     move->set_collider(named(scene.colliders(), action.collider, "collider").name());

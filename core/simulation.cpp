@@ -28,6 +28,7 @@ NextStates& next_states(std::size_t sheets) {
 FramePart Simulation::State::advance_frame(const Enough& enough, ThreadPool& pool) {
   if (!unfinished && !begin_frame(enough != nullptr)) return FramePart::kFailed;
 
+  if (!relax_coarser(enough, pool)) return FramePart::kUnfinished;
   NextStates& next = next_states(sheets.size());
   for (Decision decision = Decision::kAgain; decision == Decision::kAgain;) {
     if (!take_substeps(enough, pool)) return FramePart::kUnfinished;
@@ -40,7 +41,10 @@ FramePart Simulation::State::advance_frame(const Enough& enough, ThreadPool& poo
   substeps = plan.step.substeps;
 
   if (!keep_to_budget(next)) return FramePart::kFailed;
-  rest.add_frame(quiet(next));
+  if (relaxation && !relaxation->ended)
+    relax(quiet(next), next);
+  else
+    rest.add_frame(quiet(next));
   for (std::size_t s = 0; s < next.size(); ++s) sheets[s].set_good(next[s]);
   ++frame;
   return FramePart::kDone;
@@ -94,12 +98,13 @@ bool Simulation::State::begin_frame(bool in_parts) {
   // saving costs as much as up to 17 substeps of a lattice in single precision
   constexpr std::int64_t kWorthSaving = 1000;
   std::optional<Snapshot> before;
-  if (in_parts && plan.step.substeps >= kWorthSaving) before = snapshot();
+  const bool begins_to_relax = relaxation && !relaxation->begun;
+  if (in_parts && (plan.step.substeps >= kWorthSaving || begins_to_relax)) before = snapshot();
   if (!change_dressing() || !change_textiles()) return false;
   for (const MovingSheet& sheet : sheets) sheet.good();  // to go back to, and to show
   if (repairs.grow(frame + 1, plan.step)) begin_again();
   repairs.begin_frame();
-  unfinished = {0, std::move(before)};
+  unfinished = {0, begins_to_relax ? coarser_simulation() : nullptr, std::move(before)};
   return true;
 }
 
@@ -347,8 +352,10 @@ FramePart Simulation::advance_frame(const Enough& enough, ThreadPool& pool) {
 }
 
 double Simulation::frame_share() const {
+  constexpr double kShareOfCoarser = 1e-3;  // has begun, and no more
   const auto& unfinished = state_->unfinished;
   if (!unfinished) return 0;
+  if (unfinished->coarser) return kShareOfCoarser;
   return static_cast<double>(unfinished->substeps) /
          static_cast<double>(state_->plan.step.substeps);
 }
@@ -373,6 +380,9 @@ int Simulation::most_threads() const {
 
 const std::vector<Repair>& Simulation::repairs() const { return state_->repairs.all(); }
 const std::string& Simulation::failure() const { return state_->failure; }
+std::optional<double> Simulation::residual() const {
+  return state_->relaxation ? state_->relaxation->residual : std::nullopt;
+}
 std::int64_t Simulation::substeps() const { return state_->substeps; }
 bool Simulation::at_rest() const { return state_->rest.at_rest(); }
 bool Simulation::asleep() const { return at_rest() && !state_->scene.environment.wind; }

@@ -167,7 +167,7 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
     const std::int64_t begin = state.frame;
     sheet.ramp = {now, textile, begin, begin + static_cast<std::int64_t>(frames)};
   }
-  state.rest.disturb();
+  state.disturb(false);
   return std::nullopt;
 }
 
@@ -197,6 +197,13 @@ void Simulation::State::adopt(Constraints constraints) {
   rest_after = end_of_motion(scene);
 }
 
+// Something was done to it.
+void Simulation::State::disturb(bool relaxes) {
+  rest.disturb();
+  relaxation.reset();
+  if (relaxes) relaxation.emplace();
+}
+
 ActionContext Simulation::State::action_context() const {
   return {scene, time(), [this](std::size_t s, int i) { return sheets[s].start(i); },
           [this](std::size_t s, int i) { return sheets[s].good().x.col(i); }};
@@ -207,8 +214,21 @@ Constraints Simulation::constraints() const { return state_->constraints(); }
 std::vector<Problem> Simulation::problems_of(const std::vector<Action>& actions) const {
   state_->restore_memory();
   Constraints after = constraints();
-  return apply(actions, state_->action_context(), after);
+  auto problems = apply(actions, state_->action_context(), after);
+  if (problems.empty())
+    if (auto early = state_->problem_of_relaxing(actions, after))
+      problems.push_back(std::move(*early));
+  return problems;
 }
+
+namespace {
+
+bool asks_to_relax(const std::vector<Action>& actions) {
+  return std::any_of(actions.begin(), actions.end(),
+                     [](const Action& action) { return action.kind == Action::Kind::kRelax; });
+}
+
+}  // namespace
 
 std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
   State& state = *state_;
@@ -219,7 +239,7 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
   assert(problems.empty());
   if (hold_the_same(before, after)) {
     state.adopt(std::move(after));
-    state.rest.disturb();
+    state.disturb(asks_to_relax(actions));
     return std::nullopt;
   }
 
@@ -249,7 +269,7 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
     set_pin_velocities(state.scene.sheets[s].pins, state.time(), state.plan.step.substep,
                        states.v[s]);
   state.restart(states, dt, changed);
-  state.rest.disturb();
+  state.disturb(asks_to_relax(actions));
   return std::nullopt;
 }
 

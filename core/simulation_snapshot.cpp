@@ -12,7 +12,7 @@ Snapshot Simulation::snapshot() const {
 Snapshot Simulation::State::snapshot() const {
   assert(failure.empty() && !unfinished);
   Snapshot snapshot{frame,         substeps, rest.frames(), repairs.halvings(), plan,
-                    repairs.all(), {},       constraints()};
+                    repairs.all(), {},       constraints(), relaxation};
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const MovingSheet& sheet = sheets[s];
     snapshot.sheets.push_back({scene.sheets[s].textile, sheet.most_strain, sheet.good().x,
@@ -62,6 +62,7 @@ bool Simulation::State::adopt(const Snapshot& snapshot) {
   repairs.adopt(snapshot.halvings, snapshot.repairs);
   plan = snapshot.plan;
   grips = snapshot.constraints.grips;
+  relaxation = snapshot.relaxation;
   if (scene.dressing)
     if (const DressingState then = dressing_at(*scene.dressing, time());
         then != sheets.front().dressing)

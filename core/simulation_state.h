@@ -9,6 +9,7 @@
 #include "core/cloth_contact/cloth_contact.h"
 #include "core/contact/moving_bodies.h"
 #include "core/model/actions.h"
+#include "core/motion/relaxation.h"
 #include "core/motion/rest.h"
 #include "core/moving_sheet.h"
 #include "core/repairs.h"
@@ -28,8 +29,9 @@ struct SheetStates {
 
 // A frame that is being computed.
 struct UnfinishedFrame {
-  std::int64_t substeps = 0;       // taken by this attempt
-  std::optional<Snapshot> before;  // where it can be dropped
+  std::int64_t substeps = 0;                 // taken by this attempt
+  std::unique_ptr<Simulation> coarser = {};  // that comes to rest before
+  std::optional<Snapshot> before;            // where it can be dropped
 };
 
 struct Simulation::State {
@@ -46,6 +48,7 @@ struct Simulation::State {
   double rest_after = 0;      // s
   Repairs repairs;
   Rest rest;
+  std::optional<Relaxation> relaxation;
   bool textile_changed = false;
   std::string failure;
   std::optional<UnfinishedFrame> unfinished;
@@ -78,6 +81,15 @@ struct Simulation::State {
   bool fail(const char* what, const std::string& reason);
   bool quiet(const NextStates& next) const;
 
+  // relaxation
+  std::unique_ptr<Simulation> coarser_simulation() const;
+  bool relax_coarser(const Enough& enough, ThreadPool& pool);
+  void stand_still(double time, NextStates& next);
+  MeanMotion mean_motion(const NextStates& next) const;
+  void relax(bool quiet, NextStates& next);
+  std::optional<Problem> problem_of_relaxing(const std::vector<Action>& actions,
+                                             const Constraints& after) const;
+
   // changes
   void put_textile(std::size_t sheet, const Textile& textile);
   std::optional<StepRefusal> set_textile(std::size_t sheet, const Textile& textile);
@@ -88,6 +100,7 @@ struct Simulation::State {
   Constraints constraints() const;
   ActionContext action_context() const;
   void adopt(Constraints constraints);
+  void disturb(bool relaxes);
   SheetStates closing_states() const;
   void restart(const SheetStates& states, double old_dt, const std::vector<bool>& changed);
 

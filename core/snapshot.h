@@ -8,6 +8,7 @@
 #include "core/model/actions.h"
 #include "core/model/mesh.h"
 #include "core/motion/energy_budget.h"
+#include "core/motion/relaxation.h"
 #include "core/repairs.h"
 
 namespace weft {
@@ -31,6 +32,7 @@ struct Snapshot {
   std::vector<Repair> repairs;  // all so far
   std::vector<Sheet> sheets;
   Constraints constraints;
+  std::optional<Relaxation> relaxation = {};
 };
 
 // Whether a simulation of the scene, whatever its textiles are, could have been there.

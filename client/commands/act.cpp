@@ -36,7 +36,7 @@ void run_act(Context& context, ActOptions options) {
 
 void add_act(CLI::App& app, Context& context) {
   CLI::App* act =
-      add_group(app, "act", "Grab, drag, release and pin particles, and move colliders");
+      add_group(app, "act", "Grab, drag, release and pin particles, move colliders, and relax");
   const auto add = [&](const char* name, const char* kind, const char* description) {
     auto options = std::make_shared<ActOptions>();
     options->action.kind = kind;
@@ -71,6 +71,7 @@ void add_act(CLI::App& app, Context& context) {
   add_particle("release", "Let a grabbed particle go");
   add_particle("pin", "Hold a particle where it is, or will be released");
   add_particle("unpin", "End a pin, of the scene too");
+  add("relax", "relax", "Come to rest on the shortest way, instead of moving in time");
   const auto move = add("move", "move_collider", "Move a collider");
   move.first
       ->add_option("COLLIDER", move.second->action.collider, "Its name, where there are several")

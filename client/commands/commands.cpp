@@ -76,6 +76,11 @@ void add_session_or_scene_argument(CLI::App& command, std::string& given) {
       ->required();
 }
 
+void add_relax(CLI::App& command, bool& relax) {
+  command.add_flag("--relax", relax, "Come to rest on the shortest way, instead of moving in time")
+      ->needs("--until-rest");
+}
+
 void add_accuracy(CLI::App& command, std::optional<v1::Accuracy>& accuracy) {
   const std::map<std::string, v1::Accuracy> accuracies{{"draft", v1::ACCURACY_DRAFT},
                                                        {"standard", v1::ACCURACY_STANDARD},
@@ -150,7 +155,7 @@ std::string session_text(const v1::Session& session) {
       .add("state", state_text(session))
       .add("frame", std::to_string(session.frame()))
       .add("simulated time", seconds_text(session.time_s()))
-      .add("at rest", session.at_rest() ? "yes" : "no")
+      .add("at rest", (session.at_rest() ? "yes" : "no") + residual_text(session))
       .add("sheets", sheets_text(session.scene()))
       .add("colliders", std::to_string(session.scene().colliders_size()))
       .add("created", google::protobuf::util::TimeUtil::ToString(session.create_time()));

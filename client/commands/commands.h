@@ -94,6 +94,8 @@ void add_session_argument(CLI::App& command, std::string& session);
 void add_refuse_option(CLI::App& command, std::vector<std::string>& codes);
 void add_session_or_scene_argument(CLI::App& command, std::string& given);
 void add_accuracy(CLI::App& command, std::optional<v1::Accuracy>& accuracy);
+// --relax, which needs --until-rest.
+void add_relax(CLI::App& command, bool& relax);
 
 // "A:B", both included; either may be left out, and an empty text is all frames.
 FrameRange read_frame_range(const std::string& text);

@@ -69,7 +69,8 @@ std::string facts_text(RecordingReader& recording, const Inspection& inspection)
     facts.add("kinetic energy", number_text(tally.last_stats.kinetic_energy_j()) + " J at the end")
         .add("potential energy",
              number_text(tally.last_stats.potential_energy_j()) + " J at the end")
-        .add("at rest", tally.last_stats.at_rest() ? "yes" : "no");
+        .add("at rest",
+             (tally.last_stats.at_rest() ? "yes" : "no") + residual_text(tally.last_stats));
   }
   facts
       .add("file size",

@@ -27,25 +27,28 @@ std::string progress_text(const RecordingOrder& order, const Tally& tally, doubl
 
 void answer(Context& context, const RecordingOrder& order, const RecordingResult& result) {
   const Tally& tally = result.tally;
-  const Json json{{"file", order.path},
-                  {"session", order.session},
-                  {"complete", result.complete},
-                  {"frames", tally.frames},
-                  {"first_frame", tally.first_frame},
-                  {"last_frame", tally.last_frame},
-                  {"last_time_s", tally.last_time_s},
-                  {"substeps", tally.substeps},
-                  {"largest_strain", tally.largest_strain},
-                  {"repairs", tally.repairs},
-                  {"most_cuts", tally.most_cuts ? Json(*tally.most_cuts) : Json()},
-                  {"at_rest", tally.last_stats.at_rest()},
-                  {"reconnections", result.reconnections}};
+  const Json json{
+      {"file", order.path},
+      {"session", order.session},
+      {"complete", result.complete},
+      {"frames", tally.frames},
+      {"first_frame", tally.first_frame},
+      {"last_frame", tally.last_frame},
+      {"last_time_s", tally.last_time_s},
+      {"substeps", tally.substeps},
+      {"largest_strain", tally.largest_strain},
+      {"repairs", tally.repairs},
+      {"most_cuts", tally.most_cuts ? Json(*tally.most_cuts) : Json()},
+      {"at_rest", tally.last_stats.at_rest()},
+      {"residual", tally.last_stats.has_residual() ? Json(tally.last_stats.residual()) : Json()},
+      {"reconnections", result.reconnections}};
   std::string text = fmt::format("{}: {}", order.path, count_of(tally.frames, "frame"));
   if (tally.frames > 0) {
-    text += fmt::format(", {} to {}, up to {:.6g} s{}, largest strain {}", tally.first_frame,
-                        tally.last_frame, tally.last_time_s,
-                        tally.last_stats.at_rest() ? " (at rest)" : "",
-                        percent_text(tally.largest_strain));
+    text += fmt::format(
+        ", {} to {}, up to {:.6g} s{}, largest strain {}", tally.first_frame, tally.last_frame,
+        tally.last_time_s,
+        tally.last_stats.at_rest() ? " (at rest" + residual_text(tally.last_stats) + ")" : "",
+        percent_text(tally.largest_strain));
   }
   if (tally.repairs > 0) text += fmt::format(", {}", count_of(tally.repairs, "repair"));
   if (tally.most_cuts.value_or(0) > 0)
@@ -59,6 +62,8 @@ void run_record(Context& context, const RecordOptions& options) {
   RecordingOrder order = options.order;
   order.session = context.session_or_scene(order.session);
   order.run = order.run || context.embedded;
+  if (order.relax && !order.run)
+    throw usage_problem("--relax is for a session that runs; give --run");
   order.patience = std::chrono::seconds(options.patience_s);
 
   Pace pace;
@@ -90,6 +95,7 @@ void add_record(CLI::App& app, Context& context) {
   command->add_option("--from", order.from, "First frame; else the newest")->type_name("N");
   command->add_option("--to", order.to, "End after this frame")->type_name("N");
   command->add_flag("--until-rest", order.until_rest, "End at rest");
+  add_relax(*command, order.relax);
   command->add_flag("--run", order.run,
                     "Let the session run, as far as it is recorded (always with --embedded)");
   command->add_flag("--velocities", order.velocities, "Velocities too");

@@ -13,6 +13,7 @@ struct RunOptions {
   std::optional<double> time_scale;
   std::optional<std::int64_t> until_frame;
   bool until_rest = false;
+  bool relax = false;
   bool wait = false;
 };
 
@@ -45,6 +46,7 @@ void run_freely(Context& context, const RunOptions& options) {
   if (options.time_scale) request.set_time_scale(*options.time_scale);
   if (options.until_frame) request.set_until_frame(*options.until_frame);
   request.set_until_rest(options.until_rest);
+  if (options.relax) context.connection().relax(request.name());
   const auto response = context.connection().call(&Sessions::RunSession, request);
   if (!options.wait && !context.embedded) {
     context.answer(to_json(response),
@@ -60,9 +62,11 @@ void run_freely(Context& context, const RunOptions& options) {
   context.answer({{"applied_frame", response.applied_frame()},
                   {"frame", session.frame()},
                   {"time_s", session.time_s()},
-                  {"at_rest", session.at_rest()}},
+                  {"at_rest", session.at_rest()},
+                  {"residual", session.has_residual() ? Json(session.residual()) : Json()}},
                  fmt::format("{} at frame {}, {}{}\n", state_text(session), session.frame(),
-                             seconds_text(session.time_s()), session.at_rest() ? ", at rest" : ""));
+                             seconds_text(session.time_s()),
+                             session.at_rest() ? ", at rest" + residual_text(session) : ""));
 }
 
 }  // namespace
@@ -78,6 +82,7 @@ void add_run(CLI::App& app, Context& context) {
   command->add_option("--until-frame", options->until_frame, "Pause after this frame")
       ->type_name("N");
   command->add_flag("--until-rest", options->until_rest, "Pause at rest");
+  add_relax(*command, options->relax);
   command->add_flag("--wait", options->wait,
                     "Wait until it is paused again (always with --embedded)");
   command->callback([&context, options] { run_freely(context, *options); });

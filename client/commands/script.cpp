@@ -131,6 +131,7 @@ set      textile, a preset or file, or fields: {FIELD: VALUE ...};
 grab     row, column; sheet; likewise release, pin and unpin
 drag     row, column; sheet; to_m: [X, Y, Z]; over_s; moves as it runs on
 move     collider; to_m, an offset from its start; over_s
+relax    comes to rest on its shortest way, as it runs on
 record   file; velocities, encoding; to the end of the case
 run      until_frame, until_time_s, until_rest; time_scale;
          wait: false goes on at once

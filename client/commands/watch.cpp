@@ -100,7 +100,7 @@ class Display {
     if (stats.has_cloth_cut_count())
       facts.add("cuts of cloth", std::to_string(stats.cloth_cut_count()));
     facts.add("speed", fmt::format("{:.2f} x real time", pace_now_))
-        .add("at rest", stats.at_rest() ? "yes" : "no");
+        .add("at rest", (stats.at_rest() ? "yes" : "no") + residual_text(stats));
     std::istringstream text(facts.text());
     std::vector<std::string> lines;
     for (std::string line; std::getline(text, line);) lines.push_back(line);

@@ -19,6 +19,12 @@ std::string percent_text(double fraction);
 // Four significant digits.
 std::string number_text(double number);
 
+// Of a session or a frame's stats: " within 0.09 % of its weight" where it relaxes.
+template <class Seen>
+std::string residual_text(const Seen& seen) {
+  return seen.has_residual() ? " within " + percent_text(seen.residual()) + " of its weight" : "";
+}
+
 // The text within 80 columns: longer lines go on below, where their last column begins.
 std::string wrapped(const std::string& text);
 

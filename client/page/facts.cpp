@@ -133,7 +133,7 @@ Rows run_rows(const RecordingReader& recording, const Tally& tally) {
         "cuts of cloth",
         *tally.most_cuts == 0 ? "none" : fmt::format("{} in a frame at most", *tally.most_cuts));
   rows.emplace_back("repairs", tally.repairs == 0 ? "none" : std::to_string(tally.repairs));
-  rows.emplace_back("at rest at the end", end.at_rest() ? "yes" : "no");
+  rows.emplace_back("at rest at the end", (end.at_rest() ? "yes" : "no") + residual_text(end));
   return rows;
 }
 

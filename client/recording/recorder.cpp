@@ -26,6 +26,7 @@ v1::StreamFramesRequest stream_request(const v1::Session& session, const Recordi
 }
 
 void let_run(Connection& connection, const RecordingOrder& order) {
+  if (order.relax) connection.relax(order.session);
   v1::RunSessionRequest request;
   request.set_name(order.session);
   if (order.to) request.set_until_frame(*order.to);

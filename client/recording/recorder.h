@@ -20,6 +20,7 @@ struct RecordingOrder {
   std::optional<std::int64_t> from;  // absent: the newest frame
   std::optional<std::int64_t> to;
   bool until_rest = false;
+  bool relax = false;           // comes to rest on its shortest way, where it runs
   bool through_pauses = false;  // a pause does not end it
   bool run = false;             // lets the session run, as far as it is recorded
   bool velocities = false, pressure = false, clearance = false;

@@ -93,6 +93,7 @@ class Replay {
     session.set_frame(place.newest->number);
     session.set_time_s(place.newest->time);
     session.set_at_rest(place.newest->at_rest);
+    if (place.newest->residual) session.set_residual(*place.newest->residual);
     session.set_failure(place.failure);
     session.set_numerics_id(player.header().numerics_id());
     google::protobuf::util::TimeUtil::FromString(player.recorded_at(),

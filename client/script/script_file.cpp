@@ -357,10 +357,11 @@ class ScriptReader {
     return place;
   }
 
-  // "grab" ... of a particle, or "move" of a collider.
+  // "grab" ... of a particle, "move" of a collider, or "relax".
   What read_act(Fields& fields, Scope&) {
     ActStep step{.session = read_session(fields), .action = {.kind = fields.place("")}};
     SceneAction& action = step.action;
+    if (action.kind == "relax") return step;
     const bool moves = action.kind == "move";
     if (moves) {
       action.kind = "move_collider";
@@ -500,13 +501,14 @@ class ScriptReader {
     const char* name;
     What (ScriptReader::*read)(Fields&, Scope&);
   };
-  static constexpr std::array<Kind, 15> kKinds{{{"create", &ScriptReader::read_create},
+  static constexpr std::array<Kind, 16> kKinds{{{"create", &ScriptReader::read_create},
                                                 {"set", &ScriptReader::read_set},
                                                 {"grab", &ScriptReader::read_act},
                                                 {"drag", &ScriptReader::read_act},
                                                 {"release", &ScriptReader::read_act},
                                                 {"pin", &ScriptReader::read_act},
                                                 {"unpin", &ScriptReader::read_act},
+                                                {"relax", &ScriptReader::read_act},
                                                 {"move", &ScriptReader::read_act},
                                                 {"run", &ScriptReader::read_run},
                                                 {"wait", &ScriptReader::read_wait},

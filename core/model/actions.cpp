@@ -23,6 +23,8 @@ const char* name_of(Kind kind) {
       return "unpin";
     case Kind::kMoveCollider:
       return "move_collider";
+    case Kind::kRelax:
+      return "relax";
     case Kind::kLetGo:
       break;
   }
@@ -40,6 +42,7 @@ class ActionList {
     problems_.insert(problems_.end(), wrong.begin(), wrong.end());
     if (!wrong.empty()) return;
     if (action.kind == Kind::kLetGo) return let_go(action.hand);
+    if (action.kind == Kind::kRelax) return;
     if (action.kind == Kind::kMoveCollider) return move_collider(action);
     const auto sheet = index_of(context_.scene.sheets, action.name, ".sheet", "sheets");
     if (!sheet) return;

@@ -23,6 +23,7 @@ struct Action {
     kUnpin,         // only a hand holds it, if any
     kMoveCollider,  // instead of its path, to the target
     kLetGo,         // a hand releases all that it holds
+    kRelax,         // the scene comes to rest on its shortest way, see core/motion/relaxation.h
   };
   Kind kind = Kind::kGrab;
   std::string name{};  // of the sheet, empty where there is one; of the collider

@@ -17,6 +17,7 @@ class Rest {
   bool at_rest() const { return frames_ >= kFrames; }
   int frames() const { return frames_; }
   void add_frame(bool quiet) { frames_ = quiet ? frames_ + 1 : 0; }
+  void settle() { frames_ = kFrames; }
   // Something was changed.
   void disturb() { frames_ = 0; }
   void adopt(int frames) { frames_ = frames; }

@@ -531,10 +531,12 @@ Converted<Action> to_action(const v1::Action& action, const std::string& field) 
       lead(move, from.offset_m(), from);
       return move;
     }
+    case v1::Action::kRelax:
+      return Action{.kind = Action::Kind::kRelax};
     case v1::Action::ACTION_NOT_SET:
       break;
   }
-  return absent("", "grab, drag, release, pin, unpin or move_collider");
+  return absent("", "grab, drag, release, pin, unpin, move_collider or relax");
 }
 
 Converted<LabOrder> to_lab_order(const v1::RunTestRequest& request) {

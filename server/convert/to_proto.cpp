@@ -245,6 +245,7 @@ v1::Session to_proto(const Session& session, StartValues start_values) {
   result.set_frame(status.newest->number);
   result.set_time_s(status.newest->time);
   result.set_at_rest(status.newest->at_rest);
+  if (status.newest->residual) result.set_residual(*status.newest->residual);
   *result.mutable_plan() = to_proto(*status.plan);
   result.set_failure(status.failure);
   result.set_lateness_s(status.lateness.count());
@@ -449,6 +450,9 @@ v1::Action to_proto(const Action& action) {
     case Action::Kind::kMoveCollider:
       to.mutable_move_collider()->set_collider(action.name);
       lead(to.mutable_move_collider()->mutable_offset_m(), to.mutable_move_collider());
+      break;
+    case Action::Kind::kRelax:
+      to.mutable_relax();
       break;
     case Action::Kind::kLetGo:
       break;

@@ -232,6 +232,7 @@ std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order) {
     stats->set_at_rest(frame.at_rest);
     stats->set_repair_count(static_cast<std::int64_t>(frame.repairs.size()));
     if (frame.cloth_cuts) stats->set_cloth_cut_count(*frame.cloth_cuts);
+    if (frame.residual) stats->set_residual(*frame.residual);
   }
   return in_parts(std::move(message), order.most_bytes);
 }

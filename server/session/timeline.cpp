@@ -75,6 +75,7 @@ std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs, b
   frame->cloth_cuts = simulation.cloth_cuts();
   if (read) frame->deformation = simulation.deformation();
   frame->at_rest = simulation.at_rest();
+  frame->residual = simulation.residual();
   frame->substeps = simulation.substeps();
   frame->substep = simulation.plan().step.substep;
   frame->repairs = std::move(repairs);

@@ -84,6 +84,26 @@ EnergyBudget budget_of(const stored::KeptBudget& from) {
           .stored = from.stored_j()};
 }
 
+void set(stored::KeptRelaxation* to, const Relaxation& from) {
+  to->set_begun(from.begun);
+  to->set_ended(from.ended);
+  to->set_standing(from.standing);
+  to->set_energy_j(from.energy);
+  if (from.residual) to->set_residual(*from.residual);
+  to->set_least_residual(from.least);
+  to->set_stalls(from.stalls);
+}
+
+Relaxation relaxation_of(const stored::KeptRelaxation& from) {
+  return {.begun = from.begun(),
+          .ended = from.ended(),
+          .standing = from.standing(),
+          .energy = from.energy_j(),
+          .residual = from.has_residual() ? std::optional(from.residual()) : std::nullopt,
+          .least = from.least_residual(),
+          .stalls = from.stalls()};
+}
+
 // Plans that a snapshot shares, each once.
 class Plans {
  public:
@@ -158,6 +178,7 @@ std::string encode(const std::string& uid, const SessionSnapshot& snapshot) {
     kept->set_hand(grip.hand);
     kept->set_pinned(grip.pinned);
   }
+  if (simulation.relaxation) set(to.mutable_relaxation(), *simulation.relaxation);
   for (const LogEntry& entry : snapshot.under_way)
     to.add_under_way()->ParseFromString(encode(entry));
   *to.add_plans() = to_proto(simulation.plan);
@@ -210,6 +231,7 @@ SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes
     simulation.constraints.grips.push_back(
         {static_cast<std::size_t>(each.sheet()), each.particle(), each.hand(), each.pinned()});
   }
+  if (from.has_relaxation()) simulation.relaxation = relaxation_of(from.relaxation());
   return snapshot;
 }
 

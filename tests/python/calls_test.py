@@ -163,6 +163,14 @@ class Plain(unittest.TestCase):
         session = self.server.create_session(weft.Scene(FALL.sheets, [ball]))
         self.assertEqual(session.move_collider((0, 0.5, 0), over=0.1, collider="ball"), 1)
 
+    def test_a_session_relaxes_to_the_rest_of_its_scene(self):
+        session = self.server.create_session(hung())
+        self.assertEqual(session.relax(), 1)
+        session.run(until_rest=True)
+        session.wait()
+        self.assertTrue(session.get().at_rest)
+        self.assertLess(session.get().residual, 1e-3)
+
     def test_a_scene_with_a_refused_warning_makes_no_session(self):
         codes = ["TANGLED_START", "NO_SELF_COLLISION"]
         with self.assertRaises(weft.InvalidArgument) as refused:
@@ -507,6 +515,7 @@ class Awaited(unittest.TestCase):
             await session.get()
         ball = weft.Collider(weft.Sphere(0.1, center_m=(0, -1, 0)))
         moved = await server.create_session(weft.Scene(FALL.sheets, [ball]))
+        await moved.relax()
         await moved.move_collider((0, 0.1, 0))
 
     async def meshes(self, server):

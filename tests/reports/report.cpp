@@ -69,10 +69,12 @@ int main(int argc, char** argv) {
   const std::map<std::string, decltype(&weft::reports::accuracy)> pages = {
       {"accuracy", weft::reports::accuracy}, {"contact", weft::reports::contact},
       {"mesh", weft::reports::mesh},         {"stability", weft::reports::stability},
-      {"speed", weft::reports::speed},       {"tethers", weft::reports::tethers}};
+      {"rest", weft::reports::rest},         {"speed", weft::reports::speed},
+      {"tethers", weft::reports::tethers}};
   if (arguments.size() < 3 || !pages.contains(arguments[0])) {
-    std::cerr << "usage: weft-report accuracy|contact|mesh|stability|speed|tethers FOLDER COMMIT "
-                 "[--large]\n";
+    std::cerr
+        << "usage: weft-report accuracy|contact|mesh|rest|stability|speed|tethers FOLDER COMMIT "
+           "[--large]\n";
     return 2;
   }
   const bool large = arguments.size() > 3 && arguments[3] == "--large";

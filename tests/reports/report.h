@@ -39,6 +39,7 @@ void accuracy(const std::filesystem::path& folder, const std::string& commit, bo
 void stability(const std::filesystem::path& folder, const std::string& commit, bool large);
 void contact(const std::filesystem::path& folder, const std::string& commit, bool large);
 void mesh(const std::filesystem::path& folder, const std::string& commit, bool large);
+void rest(const std::filesystem::path& folder, const std::string& commit, bool large);
 void tethers(const std::filesystem::path& folder, const std::string& commit, bool large);
 // Of what weft-bench left in runs.json there.
 void speed(const std::filesystem::path& folder, const std::string& commit, bool large);

@@ -31,6 +31,7 @@ struct Call {
     kRelease,
     kPin,
     kUnpin,
+    kRelax,
     kSnapshot,
     kRestore,
     kAgain,
@@ -45,8 +46,8 @@ struct Call {
 
 std::ostream& operator<<(std::ostream& out, const Call& call) {
   constexpr std::array<const char*, Call::kKinds> kNames = {
-      "create",  "delete", "step",  "run",      "pause",   "set textile", "grab",   "drag",
-      "release", "pin",    "unpin", "snapshot", "restore", "again",       "restart"};
+      "create",  "delete", "step",  "run",   "pause",    "set textile", "grab",  "drag",
+      "release", "pin",    "unpin", "relax", "snapshot", "restore",     "again", "restart"};
   return out << kNames[call.kind] << " s" << call.session << ' ' << call.number << " particle "
              << call.particle;
 }
@@ -71,6 +72,7 @@ struct Arbitrary<weft::testing::Call> {
                                                           {2, Call::kRelease},
                                                           {2, Call::kPin},
                                                           {2, Call::kUnpin},
+                                                          {2, Call::kRelax},
                                                           {3, Call::kSnapshot},
                                                           {3, Call::kRestore},
                                                           {2, Call::kAgain},
@@ -337,6 +339,11 @@ class History {
         action->mutable_pin()->set_particle(p);
         done.kind = Action::Kind::kPin;
         valid = valid && !pinned;
+        break;
+      case Call::kRelax:
+        action->mutable_relax();
+        done = {.kind = Action::Kind::kRelax};
+        valid = there_ == nullptr || there_->simulation.problems_of({done}).empty();
         break;
       default:
         action->mutable_unpin()->set_particle(p);

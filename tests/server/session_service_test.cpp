@@ -138,6 +138,33 @@ TEST(Sessions, RunUntilRest) {
   EXPECT_EQ(rested.state(), v1::SESSION_STATE_PAUSED);
 }
 
+TEST(Sessions, RelaxToRestAndSayWhatForcesAreLeft) {
+  Service service;
+  const v1::Session session = service.create();
+  auto frames = frames_of(session);
+  frames.mutable_format()->set_stats(true);
+  Stream stream(service, frames);
+  EXPECT_FALSE(stream.frame().stats().has_residual());
+  v1::ApplyActionsRequest relax;
+  relax.set_name(session.name());
+  relax.add_actions()->mutable_relax();
+  ASSERT_EQ(service.error(&Sessions::ApplyActions, relax).code, grpc::StatusCode::OK);
+  EXPECT_FALSE(service.get(session).has_residual());
+  v1::RunSessionRequest request;
+  request.set_name(session.name());
+  request.set_until_rest(true);
+  ASSERT_EQ(service.error(&Sessions::RunSession, request).code, grpc::StatusCode::OK);
+  v1::FrameStats stats;
+  while (!stats.at_rest()) {
+    stats = stream.frame().stats();
+    EXPECT_TRUE(stats.has_residual());
+  }
+  EXPECT_EQ(stats.kinetic_energy_j(), 0);
+  const v1::Session rested = service.get(session);
+  EXPECT_TRUE(rested.at_rest());
+  EXPECT_EQ(rested.residual(), stats.residual());
+}
+
 TEST(Sessions, PauseAfterTheFrameTheyCompute) {
   Service service;
   const v1::Session session = service.create();

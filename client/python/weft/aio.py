@@ -33,6 +33,7 @@ from .scene import (
     MoveCollider,
     Pattern,
     PinParticle,
+    Relax,
     Release,
     Scene,
     Textile,
@@ -472,6 +473,9 @@ class Session:
         self, offset_m: Vector3, over: float | None = None, collider: str = ""
     ) -> int:
         return await self.act(MoveCollider(offset_m, over, collider))
+
+    async def relax(self) -> int:
+        return await self.act(Relax())
 
     def hand(self) -> "Hand":
         return Hand(self)

@@ -26,6 +26,7 @@ from .scene import (
     MoveCollider,
     Pattern,
     PinParticle,
+    Relax,
     Release,
     Scene,
     Sheet,
@@ -579,6 +580,10 @@ class Session:
     ) -> int:
         """Moves a collider to an offset from its start, m, within `over` simulated s."""
         return self.act(MoveCollider(offset_m, over, collider))
+
+    def relax(self) -> int:
+        """Comes to rest on the shortest way instead of moving in time; run(until_rest=True) it."""
+        return self.act(Relax())
 
     def hand(self) -> "Hand":
         """A hand that follows a mouse; it lets go when its `with` ends."""

@@ -641,7 +641,14 @@ class MoveCollider(Value):
     collider: str = ""
 
 
-Action = Union[Grab, Drag, Release, PinParticle, UnpinParticle, MoveCollider]
+@dataclass(eq=False)
+class Relax(Value):
+    """The scene comes to rest on its shortest way, instead of moving in time."""
+
+    message = action_pb2.Relax
+
+
+Action = Union[Grab, Drag, Release, PinParticle, UnpinParticle, MoveCollider, Relax]
 
 
 @dataclass(eq=False)

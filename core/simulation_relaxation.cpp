@@ -1,0 +1,133 @@
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "core/lattice/coarser.h"
+#include "core/lattice/lattice.h"
+#include "core/model/strain.h"
+#include "core/simulation_state.h"
+
+namespace weft {
+namespace {
+
+std::vector<Action> relaxing() { return {{.kind = Action::Kind::kRelax}}; }
+
+}  // namespace
+
+// Begins where this one stands; none: it relaxes by itself.
+std::unique_ptr<Simulation> Simulation::State::coarser_simulation() const {
+  std::vector<Matrix3Xd> x;
+  for (const MovingSheet& sheet : sheets) x.push_back(sheet.good().x);
+  auto coarser = coarser_scene(scene, x, time());
+  if (!coarser || !find_problems(*coarser).empty()) return nullptr;
+  auto made = std::make_unique<Simulation>(std::move(*coarser), make_solver);
+  if (made->refusal() || made->act(relaxing())) return nullptr;
+  return made;
+}
+
+// Brings fewer particles to rest first, and moves the sheets as far as those came. False: they are
+// not yet there, and it is enough.
+bool Simulation::State::relax_coarser(const Enough& enough, ThreadPool& pool) {
+  constexpr std::int64_t kMostFrames = 600;
+  if (!relaxation || relaxation->begun) return true;
+  const auto& coarser = unfinished->coarser;
+  if (coarser) {
+    while (!coarser->at_rest() && coarser->frame() < kMostFrames) {
+      const FramePart part = coarser->advance_frame(enough, pool);
+      if (part == FramePart::kUnfinished) return false;
+      if (part == FramePart::kFailed) break;
+      if (enough && enough()) return false;
+    }
+  }
+  NextStates begin(sheets.size());
+  Eigen::Index first = 0;
+  std::vector<double> all(coarser ? 3 * static_cast<std::size_t>(coarser->particle_count()) : 0);
+  if (coarser) coarser->copy_positions(all);
+  const auto planes = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>>(
+      all.data(), 3, static_cast<Eigen::Index>(all.size() / 3));
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    begin[s].x = sheets[s].good().x;
+    if (!coarser || !coarser->failure().empty()) continue;
+    const SheetDefinition& coarse = coarser->scene().sheets[s];
+    const Matrix3Xd there = planes.middleCols(first, coarse.particle_count());
+    first += there.cols();
+    const Matrix3Xd way =
+        resample(there - start_positions(coarse), grid_of(coarse), grid_of(scene.sheets[s]));
+    for (Eigen::Index i = 0; i < way.cols(); ++i)
+      if (sheets[s].dynamics.inverse_mass[i] > 0) begin[s].x.col(i) += way.col(i);
+  }
+  stand_still(time(), begin);
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    sheets[s].most_strain =
+        std::max(sheets[s].most_strain, 2 * largest_strain(sheets[s].mesh, begin[s].x));
+    sheets[s].set_good(begin[s]);
+    sheets[s].budget = {};
+  }
+  unfinished->coarser.reset();
+  relaxation->begun = true;
+  return true;
+}
+
+// Solvers go on from where the sheets are, at `time`, without motion.
+void Simulation::State::stand_still(double time, NextStates& next) {
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    next[s].v = Matrix3Xd::Zero(3, next[s].x.cols());
+    next[s].kinetic_energy = 0;
+    sheets[s].solver->start(next[s].x, next[s].v, time, plan.step.substep);
+  }
+  forget_motion();
+}
+
+MeanMotion Simulation::State::mean_motion(const NextStates& next) const {
+  const double frame_step = scene.solver.frame_step, given = scene.environment.gravity.norm();
+  MeanMotion motion;
+  double squares = 0;
+  int free = 0;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const MovingSheet& sheet = sheets[s];
+    for (Eigen::Index i = 0; i < next[s].x.cols(); ++i) {
+      if (sheet.dynamics.inverse_mass[i] == 0) continue;
+      const double square = (next[s].x.col(i) - sheet.good().x.col(i)).squaredNorm();
+      motion.energy += sheet.mesh.mass[i] / 2 * square / (frame_step * frame_step);
+      squares += square;
+      ++free;
+    }
+  }
+  if (free == 0) return motion;
+  // x = a t^2 / 2
+  motion.acceleration = 2 * std::sqrt(squares / free) / (frame_step * frame_step) /
+                        (given > 0 ? given : kStandardGravity);
+  return motion;
+}
+
+// At the end of a frame.
+void Simulation::State::relax(bool quiet, NextStates& next) {
+  const Relaxation::Next then = relaxation->look(mean_motion(next), quiet);
+  if (then == Relaxation::Next::kMoveOn) return;
+  if (then == Relaxation::Next::kRest) rest.settle();
+  stand_still(time() + scene.solver.frame_step, next);
+}
+
+// Of what must have ended before.
+std::optional<Problem> Simulation::State::problem_of_relaxing(const std::vector<Action>& actions,
+                                                              const Constraints& after) const {
+  const auto found = std::find_if(actions.begin(), actions.end(), [](const Action& action) {
+    return action.kind == Action::Kind::kRelax;
+  });
+  if (found == actions.end()) return std::nullopt;
+  Scene moved = scene;
+  for (std::size_t s = 0; s < sheets.size(); ++s) moved.sheets[s].pins = after.pins[s];
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c) moved.colliders[c].path = after.paths[c];
+  double end = end_of_motion(moved);
+  for (const MovingSheet& sheet : sheets)
+    if (sheet.ramp)
+      end = std::max(end, static_cast<double>(sheet.ramp->end) * scene.solver.frame_step);
+  if (end <= time()) return std::nullopt;
+  std::ostringstream why;
+  why << "the scene is dressed, moved or given another textile until " << end << " s, and is at "
+      << time() << " s: relax it from then on";
+  return Problem{"actions[" + std::to_string(found - actions.begin()) + "].relax", why.str()};
+}
+
+}  // namespace weft

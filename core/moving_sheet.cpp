@@ -9,6 +9,7 @@
 namespace weft {
 
 void MovingSheet::set_definition(const Scene& scene, const SheetDefinition& definition) {
+  damping_in_motion.reset();
   Mesh made = make_mesh(definition);
   if (const auto& ratio = definition.textile.damping_ratio)
     made.damping = damping_of(definition, made, *ratio);

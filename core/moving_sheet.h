@@ -24,6 +24,7 @@ struct MovingSheet {
   DressingState dressing;
   EnergyBudget budget;
   std::optional<TextileRamp> ramp;
+  std::optional<double> damping_in_motion;  // while it relaxes with less, kg/s
 
   // Mesh, forces and skin of a definition: its textile as it is simulated, and its pins.
   void set_definition(const Scene& scene, const SheetDefinition& definition);

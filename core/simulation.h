@@ -75,11 +75,11 @@ class Simulation {
   std::int64_t substeps() const;
 
   std::int64_t frame() const;
-  double time() const;         // s
-  bool at_rest() const;        // for 30 frames, see Session.at_rest in the interface
-  bool asleep() const;         // at rest, and nothing will wake it but a change
-  // While it relaxes, and at the rest it came to: the net forces over weights, root mean square over
-  // free particles, when it last began to move from standing.
+  double time() const;   // s
+  bool at_rest() const;  // for 30 frames, see Session.at_rest in the interface
+  bool asleep() const;   // at rest, and nothing will wake it but a change
+  // While it relaxes, and at the rest it came to: the net forces over weights, root mean square
+  // over free particles, when it last began to move from standing.
   std::optional<double> residual() const;
   int particle_count() const;  // of all sheets
 

@@ -155,15 +155,21 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
   MovingSheet& sheet = state.sheets[index];
   const Textile now = state.scene.sheets[index].textile;
   if (!sheet.ramp && textile == now) return std::nullopt;
+  const bool relaxed = state.has_less_damping();
+  if (relaxed) state.set_damping(false);
+  const auto refuse = [&](const StepRefusal& refused) {
+    if (relaxed) state.set_damping(true);
+    return refused;
+  };
   const double frames = std::ceil(duration / state.scene.solver.frame_step - 1e-9);
   if (frames <= 1) {
-    if (const auto refused = state.set_textile(index, textile)) return refused;
+    if (const auto refused = state.set_textile(index, textile)) return refuse(*refused);
     sheet.ramp.reset();
   } else {
     state.put_textile(index, textile);
     const Plan plan = state.plan_now();
     state.put_textile(index, now);
-    if (const auto refused = state.refusal_of(plan.step)) return refused;
+    if (const auto refused = state.refusal_of(plan.step)) return refuse(*refused);
     const std::int64_t begin = state.frame;
     sheet.ramp = {now, textile, begin, begin + static_cast<std::int64_t>(frames)};
   }
@@ -197,9 +203,14 @@ void Simulation::State::adopt(Constraints constraints) {
   rest_after = end_of_motion(scene);
 }
 
-// Something was done to it.
+// Something was done to it. Where it relaxed, sheets have the damping of their textiles again.
 void Simulation::State::disturb(bool relaxes) {
   rest.disturb();
+  if (has_less_damping()) {
+    const SheetStates states = closing_states();
+    make_solvers();
+    restart(states, plan.step.substep, std::vector<bool>(sheets.size(), true));
+  }
   relaxation.reset();
   if (relaxes) relaxation.emplace();
 }
@@ -233,6 +244,8 @@ bool asks_to_relax(const std::vector<Action>& actions) {
 std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
   State& state = *state_;
   state.restore_memory();
+  const bool relaxed = state.has_less_damping();
+  if (relaxed) state.set_damping(false);
   const Constraints before = constraints();
   Constraints after = before;
   [[maybe_unused]] const auto problems = apply(actions, state.action_context(), after);
@@ -261,6 +274,7 @@ std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
     Plan plan = state.plan_now();
     if (const auto refused = state.refusal_of(plan.step)) {
       state.adopt(before);
+      if (relaxed) state.set_damping(true);
       return refused;
     }
     state.plan = std::move(plan);

@@ -40,6 +40,8 @@ bool Simulation::State::relax_coarser(const Enough& enough, ThreadPool& pool) {
       if (enough && enough()) return false;
     }
   }
+  set_damping(true);
+  make_solvers();
   NextStates begin(sheets.size());
   Eigen::Index first = 0;
   std::vector<double> all(coarser ? 3 * static_cast<std::size_t>(coarser->particle_count()) : 0);
@@ -67,6 +69,30 @@ bool Simulation::State::relax_coarser(const Enough& enough, ThreadPool& pool) {
   unfinished->coarser.reset();
   relaxation->begun = true;
   return true;
+}
+
+bool Simulation::State::has_less_damping() const {
+  return relaxation && relaxation->begun && !relaxation->ended;
+}
+
+// With little damping sheets come to rest soonest: what damps fast modes holds up slow ones.
+// Solvers are then to be made anew.
+void Simulation::State::set_damping(bool relaxes) {
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    MovingSheet& sheet = sheets[s];
+    double& damping = sheet.mesh.damping;
+    if (relaxes && damping > 0) {
+      sheet.damping_in_motion = damping;
+      damping *= std::min(1.0, 2 * kSafeDampingRatio / plan.dampings[s].ratio);
+    } else if (!relaxes && sheet.damping_in_motion) {
+      damping = *std::exchange(sheet.damping_in_motion, std::nullopt);
+    }
+  }
+}
+
+void Simulation::State::make_solvers() {
+  for (std::size_t s = 0; s < sheets.size(); ++s)
+    sheets[s].solver = make_solver(scene, simulated(s), sheets[s].mesh, sheets[s].dynamics);
 }
 
 // Solvers go on from where the sheets are, at `time`, without motion.
@@ -105,7 +131,11 @@ MeanMotion Simulation::State::mean_motion(const NextStates& next) const {
 void Simulation::State::relax(bool quiet, NextStates& next) {
   const Relaxation::Next then = relaxation->look(mean_motion(next), quiet);
   if (then == Relaxation::Next::kMoveOn) return;
-  if (then == Relaxation::Next::kRest) rest.settle();
+  if (then == Relaxation::Next::kRest) {
+    rest.settle();
+    set_damping(false);
+    make_solvers();
+  }
   stand_still(time() + scene.solver.frame_step, next);
 }
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cassert>
 
 #include "core/simulation_state.h"
@@ -67,6 +68,13 @@ bool Simulation::State::adopt(const Snapshot& snapshot) {
     if (const DressingState then = dressing_at(*scene.dressing, time());
         then != sheets.front().dressing)
       dress(then);
+  const auto has_less = [](const MovingSheet& sheet) {
+    return sheet.damping_in_motion.has_value();
+  };
+  if (has_less_damping() != std::any_of(sheets.begin(), sheets.end(), has_less)) {
+    set_damping(has_less_damping());
+    make_solvers();
+  }
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     MovingSheet& sheet = sheets[s];
     const Snapshot::Sheet& saved = snapshot.sheets[s];

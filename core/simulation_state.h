@@ -85,6 +85,9 @@ struct Simulation::State {
   std::unique_ptr<Simulation> coarser_simulation() const;
   bool relax_coarser(const Enough& enough, ThreadPool& pool);
   void stand_still(double time, NextStates& next);
+  bool has_less_damping() const;
+  void set_damping(bool relaxes);
+  void make_solvers();
   MeanMotion mean_motion(const NextStates& next) const;
   void relax(bool quiet, NextStates& next);
   std::optional<Problem> problem_of_relaxing(const std::vector<Action>& actions,

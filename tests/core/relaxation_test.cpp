@@ -140,12 +140,16 @@ TEST(Relaxation, IsRefusedAsLongAsTheSceneIsMoved) {
 }
 
 TEST(Relaxation, EndsWithTheNextActionAndTheSceneMovesOn) {
-  Simulation simulation(hung(31));
+  Scene scene = hung(31);
+  scene.sheets[0].textile.damping = 0.02;
+  Simulation simulation(scene);
+  const double damping = simulation.plan().dampings[0].damping;
   ASSERT_FALSE(simulation.act({kRelax}));
   move(simulation, 2);
   EXPECT_TRUE(simulation.residual());
   ASSERT_FALSE(simulation.act({{.kind = Action::Kind::kUnpin, .particle = 0}}));
   EXPECT_FALSE(simulation.residual());
+  EXPECT_EQ(simulation.plan().dampings[0].damping, damping);
   const double before = positions(simulation)(1, 0);
   move(simulation, 12);
   EXPECT_LT(positions(simulation)(1, 0), before - 0.1);  // falls for 0.2 s
@@ -164,6 +168,26 @@ TEST(Relaxation, AsksFewerParticlesFirst) {
   ASSERT_FALSE(alone.act({kRelax}));
   move(alone, 1);
   EXPECT_GT(positions(alone).row(1).minCoeff(), -0.01);
+}
+
+TEST(Relaxation, ATextileThatIsRefusedChangesNothing) {
+  Scene scene = hung(31);
+  scene.sheets[0].textile.damping = 0.02;
+  Simulation simulation(scene), other(scene);
+  for (Simulation* each : {&simulation, &other}) {
+    each->limit_frame_work(961 * 2 * each->plan().step.substeps);
+    ASSERT_FALSE(each->act({kRelax}));
+    move(*each, 2);
+  }
+  Textile stiff = scene.sheets[0].textile;
+  std::get<MeasuredTextile>(stiff.model).tensile_warp = 1e5;
+  ASSERT_TRUE(simulation.set_textile(0, stiff));
+  ASSERT_TRUE(simulation.set_textile(0, stiff, 1));
+  for (int frame = 0; frame < 10; ++frame) {
+    move(simulation, 1);
+    move(other, 1);
+    ASSERT_EQ(hash_of(positions(simulation)), hash_of(positions(other)));
+  }
 }
 
 TEST(Relaxation, InPartsOrTakenBackIsTheSameToTheBit) {

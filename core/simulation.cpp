@@ -41,7 +41,7 @@ FramePart Simulation::State::advance_frame(const Enough& enough, ThreadPool& poo
   substeps = plan.step.substeps;
 
   if (!keep_to_budget(next)) return FramePart::kFailed;
-  if (relaxation && !relaxation->ended)
+  if (is_relaxing())
     relax(quiet(next), next);
   else
     rest.add_frame(quiet(next));
@@ -98,13 +98,13 @@ bool Simulation::State::begin_frame(bool in_parts) {
   // saving costs as much as up to 17 substeps of a lattice in single precision
   constexpr std::int64_t kWorthSaving = 1000;
   std::optional<Snapshot> before;
-  const bool begins_to_relax = relaxation && !relaxation->begun;
-  if (in_parts && (plan.step.substeps >= kWorthSaving || begins_to_relax)) before = snapshot();
+  if (in_parts && (plan.step.substeps >= kWorthSaving || (relaxation && !relaxation->begun)))
+    before = snapshot();
   if (!change_dressing() || !change_textiles()) return false;
   for (const MovingSheet& sheet : sheets) sheet.good();  // to go back to, and to show
   if (repairs.grow(frame + 1, plan.step)) begin_again();
   repairs.begin_frame();
-  unfinished = {0, begins_to_relax ? coarser_simulation() : nullptr, std::move(before)};
+  unfinished = {0, begins_to_relax() ? coarser_simulation() : nullptr, std::move(before)};
   return true;
 }
 

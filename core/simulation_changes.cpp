@@ -155,7 +155,7 @@ std::optional<StepRefusal> Simulation::set_textile(std::size_t index, const Text
   MovingSheet& sheet = state.sheets[index];
   const Textile now = state.scene.sheets[index].textile;
   if (!sheet.ramp && textile == now) return std::nullopt;
-  const bool relaxed = state.has_less_damping();
+  const bool relaxed = state.is_relaxing();
   if (relaxed) state.set_damping(false);
   const auto refuse = [&](const StepRefusal& refused) {
     if (relaxed) state.set_damping(true);
@@ -206,7 +206,7 @@ void Simulation::State::adopt(Constraints constraints) {
 // Something was done to it. Where it relaxed, sheets have the damping of their textiles again.
 void Simulation::State::disturb(bool relaxes) {
   rest.disturb();
-  if (has_less_damping()) {
+  if (is_relaxing()) {
     const SheetStates states = closing_states();
     make_solvers();
     restart(states, plan.step.substep, std::vector<bool>(sheets.size(), true));
@@ -225,11 +225,7 @@ Constraints Simulation::constraints() const { return state_->constraints(); }
 std::vector<Problem> Simulation::problems_of(const std::vector<Action>& actions) const {
   state_->restore_memory();
   Constraints after = constraints();
-  auto problems = apply(actions, state_->action_context(), after);
-  if (problems.empty())
-    if (auto early = state_->problem_of_relaxing(actions, after))
-      problems.push_back(std::move(*early));
-  return problems;
+  return apply(actions, state_->action_context(), after);
 }
 
 namespace {
@@ -244,7 +240,7 @@ bool asks_to_relax(const std::vector<Action>& actions) {
 std::optional<StepRefusal> Simulation::act(const std::vector<Action>& actions) {
   State& state = *state_;
   state.restore_memory();
-  const bool relaxed = state.has_less_damping();
+  const bool relaxed = state.is_relaxing();
   if (relaxed) state.set_damping(false);
   const Constraints before = constraints();
   Constraints after = before;

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <utility>
 
 #include "core/lattice/coarser.h"
@@ -14,6 +13,14 @@ namespace {
 std::vector<Action> relaxing() { return {{.kind = Action::Kind::kRelax}}; }
 
 }  // namespace
+
+// Once nothing moves the scene but its forces.
+bool Simulation::State::begins_to_relax() const {
+  constexpr double kRounding = 1e-9;
+  const auto changes = [](const MovingSheet& sheet) { return sheet.ramp.has_value(); };
+  return relaxation && !relaxation->begun && time() >= rest_after - kRounding &&
+         std::none_of(sheets.begin(), sheets.end(), changes);
+}
 
 // Begins where this one stands; none: it relaxes by itself.
 std::unique_ptr<Simulation> Simulation::State::coarser_simulation() const {
@@ -30,7 +37,7 @@ std::unique_ptr<Simulation> Simulation::State::coarser_simulation() const {
 // not yet there, and it is enough.
 bool Simulation::State::relax_coarser(const Enough& enough, ThreadPool& pool) {
   constexpr std::int64_t kMostFrames = 600;
-  if (!relaxation || relaxation->begun) return true;
+  if (!begins_to_relax()) return true;
   const auto& coarser = unfinished->coarser;
   if (coarser) {
     while (!coarser->at_rest() && coarser->frame() < kMostFrames) {
@@ -71,7 +78,7 @@ bool Simulation::State::relax_coarser(const Enough& enough, ThreadPool& pool) {
   return true;
 }
 
-bool Simulation::State::has_less_damping() const {
+bool Simulation::State::is_relaxing() const {
   return relaxation && relaxation->begun && !relaxation->ended;
 }
 
@@ -137,27 +144,6 @@ void Simulation::State::relax(bool quiet, NextStates& next) {
     make_solvers();
   }
   stand_still(time() + scene.solver.frame_step, next);
-}
-
-// Of what must have ended before.
-std::optional<Problem> Simulation::State::problem_of_relaxing(const std::vector<Action>& actions,
-                                                              const Constraints& after) const {
-  const auto found = std::find_if(actions.begin(), actions.end(), [](const Action& action) {
-    return action.kind == Action::Kind::kRelax;
-  });
-  if (found == actions.end()) return std::nullopt;
-  Scene moved = scene;
-  for (std::size_t s = 0; s < sheets.size(); ++s) moved.sheets[s].pins = after.pins[s];
-  for (std::size_t c = 0; c < scene.colliders.size(); ++c) moved.colliders[c].path = after.paths[c];
-  double end = end_of_motion(moved);
-  for (const MovingSheet& sheet : sheets)
-    if (sheet.ramp)
-      end = std::max(end, static_cast<double>(sheet.ramp->end) * scene.solver.frame_step);
-  if (end <= time()) return std::nullopt;
-  std::ostringstream why;
-  why << "the scene is dressed, moved or given another textile until " << end << " s, and is at "
-      << time() << " s: relax it from then on";
-  return Problem{"actions[" + std::to_string(found - actions.begin()) + "].relax", why.str()};
 }
 
 }  // namespace weft

@@ -71,8 +71,8 @@ bool Simulation::State::adopt(const Snapshot& snapshot) {
   const auto has_less = [](const MovingSheet& sheet) {
     return sheet.damping_in_motion.has_value();
   };
-  if (has_less_damping() != std::any_of(sheets.begin(), sheets.end(), has_less)) {
-    set_damping(has_less_damping());
+  if (is_relaxing() != std::any_of(sheets.begin(), sheets.end(), has_less)) {
+    set_damping(is_relaxing());
     make_solvers();
   }
   for (std::size_t s = 0; s < sheets.size(); ++s) {

@@ -82,16 +82,15 @@ struct Simulation::State {
   bool quiet(const NextStates& next) const;
 
   // relaxation
+  bool begins_to_relax() const;
   std::unique_ptr<Simulation> coarser_simulation() const;
   bool relax_coarser(const Enough& enough, ThreadPool& pool);
   void stand_still(double time, NextStates& next);
-  bool has_less_damping() const;
+  bool is_relaxing() const;
   void set_damping(bool relaxes);
   void make_solvers();
   MeanMotion mean_motion(const NextStates& next) const;
   void relax(bool quiet, NextStates& next);
-  std::optional<Problem> problem_of_relaxing(const std::vector<Action>& actions,
-                                             const Constraints& after) const;
 
   // changes
   void put_textile(std::size_t sheet, const Textile& textile);

@@ -44,6 +44,7 @@ bool fits(const Scene& scene, const Snapshot& snapshot) {
     return false;
   for (std::size_t s = 0; s < scene.sheets.size(); ++s)
     if (!fits(scene.sheets[s], snapshot.sheets[s], snapshot.frame)) return false;
+  if (snapshot.relaxation && snapshot.plan.dampings.size() != scene.sheets.size()) return false;
   return fits(scene, snapshot.plan.step, snapshot.halvings);
 }
 

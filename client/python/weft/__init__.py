@@ -56,7 +56,7 @@ __all__ = [
     "Drape", "Dressing", "EdgeRun", "Environment", "Error", "Frame", "Grab", "Grid", "Hand", "Hold",
     "InvalidArgument", "Isometric", "Keyframe", "MeasuredTextile", "MeshData", "MoveCollider",
     "NoConnection", "NotFound", "Panel", "Pattern", "PatternEdge", "PatternPanel", "PatternSeam",
-    "Pin", "PinParticle", "Placement", "Plane", "Poses", "RawTextile", "Recording", "Relax", "Release",
-    "Scene", "Server", "Session", "Sheet", "SolverSettings", "Sphere", "Textile", "TriangleSheet",
-    "UnpinParticle", "Violation", "Wind", "aio", "connect", "errors", "open", "serve", "v1",
+    "Pin", "PinParticle", "Placement", "Plane", "Poses", "RawTextile", "Recording", "Relax",
+    "Release", "Scene", "Server", "Session", "Sheet", "SolverSettings", "Sphere", "Textile",
+    "TriangleSheet", "UnpinParticle", "Violation", "Wind", "aio", "connect", "errors", "open", "serve", "v1",
 ]

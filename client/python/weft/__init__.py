@@ -58,5 +58,6 @@ __all__ = [
     "NoConnection", "NotFound", "Panel", "Pattern", "PatternEdge", "PatternPanel", "PatternSeam",
     "Pin", "PinParticle", "Placement", "Plane", "Poses", "RawTextile", "Recording", "Relax",
     "Release", "Scene", "Server", "Session", "Sheet", "SolverSettings", "Sphere", "Textile",
-    "TriangleSheet", "UnpinParticle", "Violation", "Wind", "aio", "connect", "errors", "open", "serve", "v1",
+    "TriangleSheet", "UnpinParticle", "Violation", "Wind", "aio", "connect", "errors", "open",
+    "serve", "v1",
 ]

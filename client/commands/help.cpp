@@ -123,7 +123,7 @@ apart until 3 s later (untangle_s). Whether a drape is good is its verdict:
   CLOTH_CUTS   edges pass through cloth
   INSIDE_BODY  particles are inside a body
   SLID_DOWN    what was held has come down by more than 30 mm
-  TOO_TIGHT    1 of 100 triangles is strained by more than 10 %
+  TOO_TIGHT    1 % of the cloth is strained by more than 10 %
 )"},
     Topic{"recordings", "Files that hold frames, and what can be done with them",
           R"(A recording holds frames of a session as they were streamed, to the bit, with

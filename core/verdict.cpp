@@ -40,18 +40,53 @@ double flat_area(const SheetShape& shape, std::size_t triangle) {
   return std::abs(first.x() * second.y() - first.y() * second.x()) / 2;
 }
 
+// Adds up areas that are strained too much by panels of a sheet, and names the one with most.
+class TightPanels {
+ public:
+  explicit TightPanels(const SheetShape& shape) {
+    const auto* mesh = std::get_if<Triangles>(&shape);
+    if (mesh != nullptr) panels_ = (*mesh)->panels;
+    area_.resize(panels_.size() + 1);
+  }
+  // One triangle after the other.
+  void add(const Strained& most) {
+    while (panel_ < panels_.size() && panels_[panel_].triangles == triangle_)
+      ++panel_, triangle_ = 0;
+    ++triangle_;
+    if (most.strain > kMostStrain99) area_[panel_] += most.area;
+  }
+  double most() const { return *std::ranges::max_element(area_); }
+  std::string name() const {
+    const auto panel = static_cast<std::size_t>(std::ranges::max_element(area_) - area_.begin());
+    return panel < panels_.size() ? panels_[panel].name : "";
+  }
+
+ private:
+  std::vector<Panel> panels_;
+  std::vector<double> area_;
+  std::size_t panel_ = 0;
+  int triangle_ = 0;
+};
+
 void find_strains(const Scene& scene, const std::vector<Matrix3Xd>& x, Verdict& verdict) {
   std::vector<Strained> warp, weft;
+  double most = 0;
   for (std::size_t s = 0; s < x.size(); ++s) {
     const SheetShape& shape = scene.sheets[s].shape;
     const Eigen::MatrixX3d planes = x[s].transpose();
     const std::vector<double> all =
         strains_of({planes.data(), planes.data() + planes.size()}, {shape});
     const std::size_t count = all.size() / 3;
+    TightPanels tight(shape);
     for (std::size_t t = 0; t < count; ++t) {
       const double area = flat_area(shape, t);
       warp.push_back({all[t], area});
       weft.push_back({all[count + t], area});
+      tight.add({std::max(all[t], all[count + t]), area});
+    }
+    if (tight.most() > most) {
+      most = tight.most();
+      verdict.tightest = tight.name();
     }
   }
   verdict.strain_warp = percentile_99(std::move(warp));
@@ -107,8 +142,11 @@ void find_faults(const Scene& scene, double time, Verdict& verdict) {
                1000 * kMostSlid, " mm: it is too wide there, or too smooth"));
   if (const double strain = std::max(verdict.strain_warp, verdict.strain_weft);
       verdict.dressed && strain > kMostStrain99)
-    fault("TOO_TIGHT", join("1 % of the cloth is strained by ", 100 * strain, " %, more than ",
-                            100 * kMostStrain99, " %"));
+    fault(
+        "TOO_TIGHT",
+        join("1 % of the cloth is strained by ", 100 * strain, " %, more than ",
+             100 * kMostStrain99, " %",
+             verdict.tightest.empty() ? "" : ", most of it in panel \"" + verdict.tightest + "\""));
 }
 
 }  // namespace

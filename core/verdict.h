@@ -26,6 +26,7 @@ struct Verdict {
   double deepest = 0;                 // of them, m
   double strain_warp = 0;             // 99th percentile by area, l / L - 1
   double strain_weft = 0;
+  std::string tightest;         // panel with most cloth that is strained too much
   double largest_pressure = 0;  // of colliders on cloth, Pa
   double slid = 0;              // of what was held: farthest down from its start, its mean, m
   std::vector<Fault> faults;    // none: it is good

@@ -275,8 +275,7 @@ LeftOut Simulation::State::find_open_seams() {
   if (sheets.front().dressing.ease == 1) return open;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     open.push_back(triangles_at_open_seams(scene.sheets[s]));
-    if (!scene.colliders.empty())
-      open_seams.emplace_back(scene.sheets[s], open.back());
+    if (!scene.colliders.empty()) open_seams.emplace_back(scene.sheets[s], open.back());
   }
   return open;
 }

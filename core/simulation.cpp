@@ -77,20 +77,27 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
     if (!sheet.dynamics.tethers.empty()) sheet.solver->pull_back(pool);
   }
   if (scene.dressing) hold_heights(scene, time + dt, sheets);
+  if (!scene.colliders.empty()) bodies.place(time + dt, dt);
+  for (std::size_t s = 0; s < open_seams.size(); ++s)
+    open_seams[s].keep_out(contacts_of(s, time, dt), dt, sheets[s]);
   if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame);
 
   // colliders last, so that no particle ends a step inside one
   if (scene.colliders.empty()) return;
-  double deflate = 0, growth = 0;
-  if (scene.dressing) {
-    deflate = dressing_at(*scene.dressing, time + dt).deflate;
-    growth = dressing_at(*scene.dressing, time).deflate - deflate;
-  }
-  bodies.place(time + dt, dt);
   for (std::size_t s = 0; s < sheets.size(); ++s)
-    sheets[s].solver->resolve(Contacts(scene.colliders, bodies, scene.sheets[s].textile.friction,
-                                       sheets[s].skin, time + dt, dt, deflate, growth),
-                              pool);
+    sheets[s].solver->resolve(contacts_of(s, time, dt), pool);
+}
+
+// In the substep from `time` to `time` + dt; bodies are placed.
+Contacts Simulation::State::contacts_of(std::size_t sheet, double time, double dt) const {
+  double deflate = 0, growth = 0, friction = scene.sheets[sheet].textile.friction;
+  if (scene.dressing) {
+    const DressingState dressing = dressing_at(*scene.dressing, time + dt);
+    deflate = dressing.deflate;
+    growth = dressing_at(*scene.dressing, time).deflate - deflate;
+    friction *= dressing.friction;
+  }
+  return {scene.colliders, bodies, friction, sheets[sheet].skin, time + dt, dt, deflate, growth};
 }
 
 // False: the frame cannot be computed.
@@ -252,8 +259,8 @@ Simulation::State::State(Scene given, SolverFactory factory)
     sheets[s].solver->start(x[s], v, 0, dt);
     sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
   }
+  const LeftOut open = find_open_seams();
   if (scene.cloth_contact) {
-    const LeftOut open = open_seams();
     cloth_contact.emplace(scene, open);
     if (auto tangled = find_tangles(scene, x, open)) plan.warnings.push_back(std::move(*tangled));
   }
@@ -261,15 +268,20 @@ Simulation::State::State(Scene given, SolverFactory factory)
 }
 
 void Simulation::State::make_cloth_contact() {
-  if (scene.cloth_contact) cloth_contact.emplace(scene, open_seams());
+  const LeftOut open = find_open_seams();
+  if (scene.cloth_contact) cloth_contact.emplace(scene, open);
 }
 
-// Triangles that reach from one panel to another pass through what lies between.
-LeftOut Simulation::State::open_seams() const {
+// Triangles that reach from one panel to another pass through what lies between: cloth contact
+// leaves them out.
+LeftOut Simulation::State::find_open_seams() {
   LeftOut open;
-  if (sheets.front().dressing.ease < 1)
-    for (const SheetDefinition& sheet : scene.sheets)
-      open.push_back(triangles_at_open_seams(sheet));
+  open_seams.clear();
+  if (sheets.front().dressing.ease == 1) return open;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    open.push_back(triangles_at_open_seams(scene.sheets[s]));
+    if (!scene.colliders.empty()) open_seams.emplace_back(scene.sheets[s], open.back());
+  }
   return open;
 }
 
@@ -284,6 +296,7 @@ void Simulation::State::release_memory() {
   if (!failure.empty() || unfinished) return;
   for (MovingSheet& sheet : sheets) sheet.release_memory();
   cloth_contact.reset();
+  open_seams.clear();
   bodies.release_memory();
   released = true;
 }

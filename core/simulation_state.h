@@ -12,6 +12,7 @@
 #include "core/motion/relaxation.h"
 #include "core/motion/rest.h"
 #include "core/moving_sheet.h"
+#include "core/open_seams.h"
 #include "core/repairs.h"
 #include "core/simulation.h"
 
@@ -41,6 +42,7 @@ struct Simulation::State {
   Plan plan;
   std::vector<MovingSheet> sheets;
   std::optional<ClothContact> cloth_contact;
+  std::vector<OpenSeams> open_seams;  // of each sheet, while they close
   MovingBodies bodies;
   std::vector<Grip> grips;  // their pins are among the scene's
   std::int64_t frame = 0;
@@ -57,8 +59,9 @@ struct Simulation::State {
   State(Scene given, SolverFactory factory);
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
   int particle_count() const;
+  LeftOut find_open_seams();
   void make_cloth_contact();
-  LeftOut open_seams() const;
+  Contacts contacts_of(std::size_t sheet, double time, double dt) const;
   void release_memory();
   void restore_memory();
   SheetDefinition simulated(std::size_t sheet) const;

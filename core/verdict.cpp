@@ -16,22 +16,78 @@ constexpr double kMostStrain99 = 0.1;  // of cloth that fits
 constexpr double kMostSlid = 0.03;     // m
 constexpr double kMostDepth = 1e-4;    // of a particle in a collider, m
 
-double percentile_99(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) * 99 / 100);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+struct Strained {
+  double strain, area;  // 1, m^2 when flat
+};
+
+// Above which 1 % of the area is strained.
+double percentile_99(std::vector<Strained> all) {
+  std::sort(all.begin(), all.end(),
+            [](const Strained& a, const Strained& b) { return a.strain > b.strain; });
+  double left = 0;
+  for (const Strained& each : all) left += 0.01 * each.area;
+  for (const Strained& each : all)
+    if ((left -= each.area) < 0) return each.strain;
+  return 0;
 }
 
+double flat_area(const SheetShape& shape, std::size_t triangle) {
+  if (const auto* grid = std::get_if<Grid>(&shape)) return grid->spacing * grid->spacing / 2;
+  const TriangleMesh& mesh = *std::get<Triangles>(shape);
+  const Vector2d corner = flat_corner(mesh, triangle, 0),
+                 first = flat_corner(mesh, triangle, 1) - corner,
+                 second = flat_corner(mesh, triangle, 2) - corner;
+  return std::abs(first.x() * second.y() - first.y() * second.x()) / 2;
+}
+
+// Adds up areas that are strained too much by panels of a sheet, and names the one with most.
+class TightPanels {
+ public:
+  explicit TightPanels(const SheetShape& shape) {
+    const auto* mesh = std::get_if<Triangles>(&shape);
+    if (mesh != nullptr) panels_ = (*mesh)->panels;
+    area_.resize(panels_.size() + 1);
+  }
+  // One triangle after the other.
+  void add(const Strained& most) {
+    while (panel_ < panels_.size() && panels_[panel_].triangles == triangle_)
+      ++panel_, triangle_ = 0;
+    ++triangle_;
+    if (most.strain > kMostStrain99) area_[panel_] += most.area;
+  }
+  double most() const { return *std::ranges::max_element(area_); }
+  std::string name() const {
+    const auto panel = static_cast<std::size_t>(std::ranges::max_element(area_) - area_.begin());
+    return panel < panels_.size() ? panels_[panel].name : "";
+  }
+
+ private:
+  std::vector<Panel> panels_;
+  std::vector<double> area_;
+  std::size_t panel_ = 0;
+  int triangle_ = 0;
+};
+
 void find_strains(const Scene& scene, const std::vector<Matrix3Xd>& x, Verdict& verdict) {
-  std::vector<double> warp, weft;
+  std::vector<Strained> warp, weft;
+  double most = 0;
   for (std::size_t s = 0; s < x.size(); ++s) {
+    const SheetShape& shape = scene.sheets[s].shape;
     const Eigen::MatrixX3d planes = x[s].transpose();
     const std::vector<double> all =
-        strains_of({planes.data(), planes.data() + planes.size()}, {scene.sheets[s].shape});
-    const auto third = static_cast<std::ptrdiff_t>(all.size() / 3);
-    warp.insert(warp.end(), all.begin(), all.begin() + third);
-    weft.insert(weft.end(), all.begin() + third, all.begin() + 2 * third);
+        strains_of({planes.data(), planes.data() + planes.size()}, {shape});
+    const std::size_t count = all.size() / 3;
+    TightPanels tight(shape);
+    for (std::size_t t = 0; t < count; ++t) {
+      const double area = flat_area(shape, t);
+      warp.push_back({all[t], area});
+      weft.push_back({all[count + t], area});
+      tight.add({std::max(all[t], all[count + t]), area});
+    }
+    if (tight.most() > most) {
+      most = tight.most();
+      verdict.tightest = tight.name();
+    }
   }
   verdict.strain_warp = percentile_99(std::move(warp));
   verdict.strain_weft = percentile_99(std::move(weft));
@@ -86,8 +142,11 @@ void find_faults(const Scene& scene, double time, Verdict& verdict) {
                1000 * kMostSlid, " mm: it is too wide there, or too smooth"));
   if (const double strain = std::max(verdict.strain_warp, verdict.strain_weft);
       verdict.dressed && strain > kMostStrain99)
-    fault("TOO_TIGHT", join("1 % of the triangles are strained by ", 100 * strain, " %, more than ",
-                            100 * kMostStrain99, " %"));
+    fault(
+        "TOO_TIGHT",
+        join("1 % of the cloth is strained by ", 100 * strain, " %, more than ",
+             100 * kMostStrain99, " %",
+             verdict.tightest.empty() ? "" : ", most of it in panel \"" + verdict.tightest + "\""));
 }
 
 }  // namespace

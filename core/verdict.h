@@ -24,8 +24,9 @@ struct Verdict {
   std::int64_t cloth_cuts = 0;        // edges through triangles of cloth, exactly
   std::int64_t particles_inside = 0;  // of colliders
   double deepest = 0;                 // of them, m
-  double strain_warp = 0;             // 99th percentile of triangles, l / L - 1
+  double strain_warp = 0;             // 99th percentile by area, l / L - 1
   double strain_weft = 0;
+  std::string tightest;         // panel with most cloth that is strained too much
   double largest_pressure = 0;  // of colliders on cloth, Pa
   double slid = 0;              // of what was held: farthest down from its start, its mean, m
   std::vector<Fault> faults;    // none: it is good

@@ -272,8 +272,8 @@ void add_drape(CLI::App& app, Context& context) {
   command->add_flag("--force", options->replace, "Replace files that exist");
   command->footer(R"(
 Panels start where the pattern places them. Seams close, without weight, then
-weight comes in; edges with the label "waist", or else the highest border of
-what has no shoulders, are held up meanwhile. It ends at rest with a verdict, and
+weight comes in; of what has no shoulders, edges with the label "waist", or else
+the highest border, are held up meanwhile. It ends at rest with a verdict, and
 exit code 1 where that is not good. On a server that is named the session stays.
   weft drape tshirt --size 40 -o tshirt.glb --page tshirt.html
   weft drape pattern.json --body body.obj --textile denim_11oz -o out.glb

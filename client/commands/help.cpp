@@ -113,17 +113,18 @@ triangles are equilateral and lie along the grain; a panel that is symmetric
 about u = constant has symmetric ones.
 
 Scenes of garments have a dressing (proto/weft/v1/scene.proto): first seams
-close, without weight, from a start without strain; edges labelled "waist" keep
-their height, or where there are none the highest border, unless it has cloth
-like shoulders above it; then weight comes in. What starts less than --deflate
-inside a body gets out as that grows. Cloth that has passed through cloth is led
-apart until 3 s later (untangle_s). Whether a drape is good is its verdict:
+close, without weight and friction, from a start without strain; then weight
+comes in. What has no shoulders is held up until it hangs: edges labelled
+"waist" keep their height, or where there are none the highest border. What
+starts less than --deflate inside a body gets out as that grows. Cloth that has
+passed through cloth is led apart until 3 s later (untangle_s). Whether a drape
+is good is its verdict:
   NOT_DRESSED  seams still close, or something is held
   NOT_AT_REST  the cloth still moves
   CLOTH_CUTS   edges pass through cloth
   INSIDE_BODY  particles are inside a body
   SLID_DOWN    what was held has come down by more than 30 mm
-  TOO_TIGHT    1 of 100 triangles is strained by more than 10 %
+  TOO_TIGHT    1 % of the cloth is strained by more than 10 %
 )"},
     Topic{"recordings", "Files that hold frames, and what can be done with them",
           R"(A recording holds frames of a session as they were streamed, to the bit, with

@@ -31,9 +31,9 @@ struct GarmentScene {
 v1::Collider garment_body(const std::string& path);
 v1::Collider garment_body(const DressForm& form);
 
-// Has the server cut the pattern and sew it. The scene dresses the bodies; edges labelled "waist",
-// or else the highest border of what has no shoulders, are held up until then. What is wrong with
-// the pattern is a Problem with panel and edge.
+// Has the server cut the pattern and sew it. The scene dresses the bodies; of what has no
+// shoulders, edges labelled "waist", or else the highest border, are held up until then. What is
+// wrong with the pattern is a Problem with panel and edge.
 GarmentScene make_garment_scene(Connection& connection, const GarmentOrder& order);
 
 }  // namespace weft::client

@@ -201,11 +201,14 @@ Contacts::Contacts(std::span<const Collider> colliders, const MovingBodies& bodi
   }
 }
 
-double Contacts::gap(const Vector3d& x) const {
-  double least = kInfinite;
-  for (const Placed& each : placed_)
-    least = std::min(least, (distance_at(each, 0, x).value - skin_) / each.steepest);
-  return least;
+Distance Contacts::nearest(const Vector3d& x) const {
+  Distance nearest{kInfinite, Vector3d::UnitY()};
+  for (const Placed& each : placed_) {
+    const auto [value, normal] = distance_at(each, 0, x);
+    if (const double gap = (value - skin_) / each.steepest; gap < nearest.value)
+      nearest = {gap, normal};
+  }
+  return nearest;
 }
 
 // Of the step, for a particle that could have met a collider in it.

@@ -58,8 +58,10 @@ class Contacts {
   double reach() const { return reach_; }
   // Whether a particle that moves so far (m) in this step could come through a collider unseen.
   bool may_cross(double moved) const { return kParts * (moved + reach_) > thinnest_; }
-  // How far a point is from the nearest skin at the end of the step, m, or less; negative inside.
-  double gap(const Vector3d& x) const;
+  // How far a point is from the nearest skin at the end of the step, m, or less; negative inside;
+  // and the direction out of that collider.
+  Distance nearest(const Vector3d& x) const;
+  double gap(const Vector3d& x) const { return nearest(x).value; }
   // Moves a particle that is closer to a collider than the skin out to it, inelastically, and slows
   // its sliding by Coulomb friction. Where it could have crossed one in the step, it meets them in
   // parts of the step, in each of which it comes no farther than a quarter of the thickness. What

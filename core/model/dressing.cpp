@@ -16,7 +16,7 @@ DressingState dressing_at(const Dressing& dressing, double time) {
   };
   const double closed = share(time, dressing.close);
   const double settled = share(time - dressing.close, dressing.settle);
-  return {closed * closed * (3 - 2 * closed), settled, (1 - settled) * dressing.drag,
+  return {closed * closed * (3 - 2 * closed), settled, settled, (1 - settled) * dressing.drag,
           (1 - settled) * dressing.deflate};
 }
 

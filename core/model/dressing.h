@@ -27,10 +27,11 @@ struct Dressing {
 
 // What a dressing does at a time.
 struct DressingState {
-  double ease = 1;     // share of the way from the shape at the start to the flat one
-  double weight = 1;   // share of gravity
-  double drag = 0;     // 1/s, beside that of the textile
-  double deflate = 0;  // m
+  double ease = 1;      // share of the way from the shape at the start to the flat one
+  double weight = 1;    // share of gravity
+  double friction = 1;  // share of that on colliders
+  double drag = 0;      // 1/s, beside that of the textile
+  double deflate = 0;   // m
 
   bool operator==(const DressingState&) const = default;
 };

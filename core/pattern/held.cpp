@@ -31,6 +31,7 @@ std::vector<std::vector<int>> borders_of(const TriangleMesh& mesh) {
   return borders;
 }
 
+// Empty where cloth like shoulders lies above it.
 std::vector<int> highest_border(const TriangleMesh& mesh) {
   constexpr double kHardlyAny = 0.05;  // of the area
   const auto height = [&](int i) { return mesh.start[as_index(i)].y(); };
@@ -57,6 +58,8 @@ std::vector<int> highest_border(const TriangleMesh& mesh) {
 }  // namespace
 
 std::vector<int> held_particles(const Pattern& pattern, const Garment& garment) {
+  const std::vector<int> border = highest_border(garment.mesh);
+  if (border.empty()) return {};
   std::set<int> held;
   for (const GarmentEdge& edge : garment.edges) {
     const std::string& label =
@@ -64,10 +67,7 @@ std::vector<int> held_particles(const Pattern& pattern, const Garment& garment) 
     if (label == "waist" || label.starts_with("waist-"))
       held.insert(edge.particles.begin(), edge.particles.end());
   }
-  if (held.empty()) {
-    const std::vector<int> border = highest_border(garment.mesh);
-    held.insert(border.begin(), border.end());
-  }
+  if (held.empty()) held.insert(border.begin(), border.end());
   return {held.begin(), held.end()};
 }
 

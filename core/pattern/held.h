@@ -6,9 +6,9 @@
 
 namespace weft {
 
-// What carries a garment until it hangs by itself: particles of edges that are labelled "waist", or
-// "waist-" and something. Without such, of the highest border where hardly any cloth lies higher:
-// what has shoulders hangs from them. Ascending.
+// What carries a garment until it hangs by itself: none where much cloth lies above the lowest
+// point of the highest border, for what has shoulders hangs from them. Else particles of edges that
+// are labelled "waist", or "waist-" and something; without such, of that border. Ascending.
 std::vector<int> held_particles(const Pattern& pattern, const Garment& garment);
 
 }  // namespace weft

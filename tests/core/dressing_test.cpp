@@ -82,6 +82,16 @@ Scene around_pole(double radius) {
   return scene;
 }
 
+// The same beside a bar that the edges from panel to panel start through, but no particle is in.
+constexpr double kBar = 0.01;  // its radius, m
+const Vector3d kBarAt(0.0985, 0, 0.042);
+Scene around_pole_beside_a_bar() {
+  Scene scene = around_pole(0.05);
+  const Vector3d end = Vector3d::UnitY();
+  scene.colliders.push_back({"bar", Capsule{kBarAt - end, kBarAt + end, kBar}, 0, {}});
+  return scene;
+}
+
 void dress(Simulation& simulation, int frames) {
   for (int i = 0; i < frames; ++i) ASSERT_TRUE(simulation.advance_frame()) << simulation.failure();
 }
@@ -198,6 +208,69 @@ TEST(Dressing, IsJudgedByWhatIsWrongWithIt) {
   EXPECT_EQ(codes(wide), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN"}));
 }
 
+TEST(Dressing, WhatReachesFromPanelToPanelIsNotDrawnThroughABody) {
+  const Scene scene = around_pole_beside_a_bar();
+  Simulation simulation(scene);
+  const auto least = [&] {  // distance of an edge from the bar's axis, m
+    const Matrix3Xd x = positions(simulation);
+    double nearest = 1;
+    for (const auto& triangle : triangles_of(scene.sheets[0].shape))
+      for (std::size_t k = 0; k < 3; ++k) {
+        Vector3d from = x.col(triangle[k]) - kBarAt, to = x.col(triangle[(k + 1) % 3]) - kBarAt;
+        from.y() = to.y() = 0;
+        const Vector3d along = to - from;
+        const double share =
+            std::clamp(-from.dot(along) / std::max(along.squaredNorm(), 1e-12), 0.0, 1.0);
+        nearest = std::min(nearest, (from + share * along).norm());
+      }
+    return nearest;
+  };
+  EXPECT_LT(least(), 0.6 * kBar);
+  for (int frame = 0; frame < 60; ++frame) {
+    dress(simulation, 1);
+    if (frame >= 6) {
+      ASSERT_GT(least(), 0.8 * kBar) << "frame " << frame;  // a step of the mesh is as long
+    }
+  }
+  EXPECT_NEAR(girth(simulation, 5), 2 * kPanelWidth, 0.01 * kPanelWidth);
+}
+
+TEST(Dressing, NothingRubsWhileSeamsClose) {
+  Scene smooth = around_pole(0.068), rough = smooth;
+  rough.sheets[0].textile.friction = 0.5;
+  for (Scene* scene : {&smooth, &rough}) scene->colliders[0].friction = 0.5;
+  Simulation slides(smooth), rubs(rough);
+  for (Simulation* simulation : {&slides, &rubs}) dress(*simulation, 60);
+  EXPECT_EQ(hash_of(positions(rubs)), hash_of(positions(slides)));
+  for (Simulation* simulation : {&slides, &rubs}) dress(*simulation, 30);
+  EXPECT_GT(mean_height(rubs), mean_height(slides) + 0.1);
+}
+
+// A triangle that is stretched by a fifth, and 200 that are not, of 1 % of its size together.
+TEST(Verdict, StrainIsOfTheClothHoweverItIsDividedIntoTriangles) {
+  Scene scene = around_pole(0.05);
+  scene.dressing.reset();
+  scene.colliders.clear();
+  SheetDefinition fine = scene.sheets[0];
+  fine.name = "fine";
+  fine.shape = Grid{11, 11, 0.001};
+  SheetDefinition coarse = scene.sheets[0];
+  coarse.name = "coarse";
+  TriangleMesh mesh;
+  mesh.flat = {{0, 0}, {0.2, 0}, {0, 0.1}};
+  mesh.start = {{1, 0, 0}, {1.24, 0, 0}, {1, 0.1, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  mesh.panels = {{"sleeve", 1, 0}};
+  coarse.shape = complete(mesh);
+  scene.sheets = {fine, coarse};
+  const Verdict verdict = Simulation(scene).verdict();
+  EXPECT_NEAR(verdict.strain_weft, 0.2, 1e-6);
+  EXPECT_NEAR(verdict.strain_warp, 0, 1e-6);
+  ASSERT_EQ(verdict.faults.size(), 2U);
+  EXPECT_EQ(verdict.faults[1].code, "TOO_TIGHT");
+  EXPECT_NE(verdict.faults[1].message.find("panel \"sleeve\""), std::string::npos);
+}
+
 TEST(Dressing, WeightComesInOnceSeamsAreClosed) {
   Scene scene = around_pole(0.05);
   scene.dressing->close = 0.5;
@@ -253,7 +326,7 @@ TEST(Dressing, CollidersAreSmallerWhileSeamsClose) {
 }
 
 TEST(Dressing, IsTheSameFromASnapshotAndAfterADroppedFrame) {
-  const Scene scene = around_pole(0.05);
+  const Scene scene = around_pole_beside_a_bar();
   Simulation simulation(scene), restored(scene);
   dress(simulation, 20);
   ASSERT_TRUE(restored.restore(simulation.snapshot()));

@@ -48,6 +48,42 @@ v1::BuildGarmentRequest skirt() {
   return request;
 }
 
+// Two panels sewn at the sides, with straps a tenth of a metre wide that are sewn on the shoulders.
+v1::BuildGarmentRequest vest() {
+  v1::BuildGarmentRequest request;
+  v1::Pattern& pattern = *request.mutable_pattern();
+  for (const auto& [name, z] : {std::pair("front", 0.2), {"back", -0.2}}) {
+    v1::PatternPanel* panel = pattern.add_panels();
+    panel->set_name(name);
+    for (const auto& [u, v] : {std::pair(0.5, 0.0),
+                               {0.5, 0.3},
+                               {0.4, 0.5},
+                               {0.3, 0.5},
+                               {0.3, 0.3},
+                               {0.2, 0.3},
+                               {0.2, 0.5},
+                               {0.1, 0.5},
+                               {0.0, 0.3},
+                               {0.0, 0.0}}) {
+      v1::PatternEdge* edge = panel->add_edges();
+      edge->add_points_m(u);
+      edge->add_points_m(v);
+    }
+    panel->mutable_edges(0)->set_label("waist");
+    panel->mutable_placement()->mutable_origin_m()->set_z(z);
+    if (z < 0) {  // its outside looks back
+      panel->mutable_placement()->mutable_rotation()->set_y(1);
+      panel->mutable_placement()->mutable_origin_m()->set_x(0.5);
+    }
+  }
+  sew(pattern, "front", 1, "back", 9);
+  sew(pattern, "front", 9, "back", 1);
+  sew(pattern, "front", 3, "back", 7);
+  sew(pattern, "front", 7, "back", 3);
+  request.set_edge_m(0.03);
+  return request;
+}
+
 std::pair<v1::BuildGarmentResponse, Error> build(Service& service,
                                                  const v1::BuildGarmentRequest& request) {
   grpc::ClientContext context;
@@ -55,6 +91,14 @@ std::pair<v1::BuildGarmentResponse, Error> build(Service& service,
   const auto stub = v1::GarmentService::NewStub(service.channel);
   const grpc::Status status = stub->BuildGarment(&context, request, &response);
   return {response, Error(status)};
+}
+
+TEST(GarmentService, ShouldersCarryAGarmentThatHasThemNotItsWaist) {
+  Service service;
+  const auto [garment, error] = build(service, vest());
+  ASSERT_EQ(error.code, grpc::StatusCode::OK) << error.message;
+  EXPECT_EQ(garment.edges(0).label(), "waist");
+  EXPECT_EQ(garment.dressing().holds_size(), 0);
 }
 
 TEST(GarmentService, BuildsASheetThatCanBeSimulatedAndSaysWhichParticlesEdgesHave) {

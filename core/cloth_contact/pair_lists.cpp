@@ -11,64 +11,58 @@ PairLists::PairLists(const Cloth& cloth) : cloth_(cloth), blocks_(cloth) {}
 void PairLists::forget() {
   before_ = {};
   lists_ = {};
-  motion_ = {};
+  since_ = in_window_ = {};
+  near_ = 0;
   met_left_ = lasts_ = -1;
 }
 
-bool PairLists::update(const Matrix3Xd& x, double margin, double step) {
-  // until now, where it is not known better
-  const Vector3d half = Vector3d::Constant(std::min(step, kMostMotion * cloth_.thickest) / 2);
-  // faster than that they are looked at in every step
-  step = std::min(step, cloth_.thickest);
-  // some steps pass until they are looked at again; lists of flat cloth stay empty: what shares no
-  // particle there is 2.8 thicknesses apart
-  const double least = margin + std::max(3 * step, 0.25 * cloth_.thickest),
-               reach = std::max(1.6 * cloth_.thickest, 1.5 * least),
-               least_pruned = margin + std::max(2 * step, 0.1 * cloth_.thickest),
-               pruned_reach = least_pruned + 0.2 * cloth_.thickest;
-  blocks_.set(x);
-  NearBlocks::Box all(-half, half);
+void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now) {
+  const double thickest = cloth_.thickest, most = kMostMotion * thickest;
+  const auto length = [&](const NearBlocks::Box& box) {
+    constexpr double kRounding = 1e-12;  // m, of positions
+    const double moved = box.diagonal().norm() + kRounding;
+    return moved < most ? moved : most;
+  };
+  blocks_.set(from);
+  const double comes = length(blocks_.box_motion(from, now, in_window_));
+  double moved = most;
   if (before_.cols() > 0) {
-    all = blocks_.box_motion(before_, x, motion_);
+    moved = length(blocks_.box_motion(before_, from, since_));
     for (List& list : lists_) {
-      const double moved = motion(list.blocks);
-      list.left -= moved;
-      list.pruned_left -= moved;
+      const double by = between(since_, list.blocks);
+      list.left -= by;
+      list.pruned_left -= by;
     }
-  } else {
-    motion_.assign(static_cast<std::size_t>(blocks_.blocks()), all);
   }
-  before_ = x;
+  before_ = from;
 
-  constexpr double kBlocksReach = 8;  // as far as that of lists
-  const double most = kMostMotion * cloth_.thickest, moved = std::min(all.diagonal().norm(), most);
+  constexpr double kBlocksReach = 5;  // of the thickest cloth
   met_left_ -= moved;
-  if (!(met_left_ >= least)) meet(kBlocksReach * reach + moved);
+  if (!(met_left_ >= comes)) meet(std::max(kBlocksReach * thickest, 4 * comes));
 
-  bool changed = false;
   lasts_ = met_left_;
+  near_ = 0;
   for (List& list : lists_) {
-    // what was near before this motion is near enough now
-    if (!(list.left >= least)) {
-      const bool had_none = list.near().empty();
-      renew(x, least, reach, list);
-      changed = changed || !had_none || !list.near().empty();
-    }
-    if (list.is_pruned && !(list.pruned_left >= least_pruned)) {
-      prune(x, pruned_reach + motion(list.blocks), list);
-      changed = true;
-    }
+    // some windows pass until they are looked at again; lists of flat cloth stay empty: what
+    // shares no particle there is 2.8 thicknesses apart
+    list.came = between(in_window_, list.blocks);
+    if (!(list.left >= list.came))
+      renew(from, list.came + std::min(2 * list.came, 0.5 * thickest) + 0.1 * thickest,
+            std::max(1.6 * thickest, list.came + std::min(7 * list.came, thickest)), list);
+    if (list.is_pruned && !(list.pruned_left >= list.came))
+      prune(from, list.came + std::clamp(3 * list.came, 0.05 * thickest, 0.5 * thickest), list);
     lasts_ = std::min(lasts_, list.is_pruned ? list.pruned_left : list.left);
+    if (!list.near().empty()) ++near_;
   }
-  return changed;
 }
 
-// Of two blocks since the last update in relation to each other, m: what each moved by lies in a
-// box, and what both moved by in one around these.
-double PairLists::motion(const BlockPair& blocks) const {
-  const NearBlocks::Box both = motion_[static_cast<std::size_t>(blocks.one)].merged(
-      motion_[static_cast<std::size_t>(blocks.other)]);
-  const double most = kMostMotion * cloth_.thickest, moved = both.diagonal().norm();
+// What two blocks moved by in relation to each other, m: what each moved by lies in a box, and what
+// both moved by in one around these.
+double PairLists::between(const Motion& motion, const BlockPair& blocks) const {
+  constexpr double kRounding = 1e-12;
+  const NearBlocks::Box both = motion[static_cast<std::size_t>(blocks.one)].merged(
+      motion[static_cast<std::size_t>(blocks.other)]);
+  const double most = kMostMotion * cloth_.thickest, moved = both.diagonal().norm() + kRounding;
   return moved < most ? moved : most;
 }
 
@@ -128,30 +122,25 @@ void PairLists::meet(double reach) {
 
 void PairLists::renew(const Matrix3Xd& x, double least, double reach, List& list) {
   constexpr std::size_t kWorthPruning = 32;
-  constexpr double kWorth = 1.2;  // of what it is to last at least
-  const double moved = motion(list.blocks);
   if (list.made_at.cols() > 0) list.left = list.reach - change(x, list);
-  if (list.left >= kWorth * least) return;
-  list.pairs = list.pruned = {};
+  if (list.left >= least) return;
+  list.all = list.pruned = {};
   list.is_pruned = false;
   list.made_at.resize(3, 0);
   list.left = blocks_.distance(list.blocks) - cloth_.thickest;
-  if (list.left >= kWorth * least + moved) return;
-  list.left = list.reach = reach + moved;
+  if (list.left >= least) return;
+  list.left = list.reach = reach;
   place(x, list.blocks, list.made_at);
-  list.pairs = find_pairs(cloth_, blocks_, list.blocks, x, list.reach);
-  list.is_pruned = list.pairs.corners.size() + list.pairs.edges.size() >= kWorthPruning;
+
+  list.all = candidates_of(cloth_, find_pairs(cloth_, blocks_, list.blocks, x, list.reach));
+
+  list.is_pruned = list.all.size() >= kWorthPruning;
   list.pruned_left = -1;
 }
 
 void PairLists::prune(const Matrix3Xd& x, double reach, List& list) {
   list.pruned_left = std::min(reach, list.left);
-  list.pruned.corners.clear();
-  list.pruned.edges.clear();
-  for (const ClothPair& pair : list.pairs.corners)
-    if (near_corner(cloth_, x, pair.first, pair.second, reach)) list.pruned.corners.push_back(pair);
-  for (const ClothPair& pair : list.pairs.edges)
-    if (near_edges(cloth_, x, pair.first, pair.second, reach)) list.pruned.edges.push_back(pair);
+  list.pruned = nearer(list.all, x, reach);
 }
 
 }  // namespace weft

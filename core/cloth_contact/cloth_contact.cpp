@@ -58,11 +58,17 @@ void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step) {
   come_ = 0;
   window_.reach = std::clamp(kSpare * window_.most_steps * in_step, kLeastReach * cloth_.thickest,
                              kWindowReach * cloth_.thickest);
-  window_.is_known = scene_.solver.plain || !lists_.empty() ||
-                     moved_ + in_step + kSpare * window_.reach > lists_.lasts();
+  const double most_come = in_step + kSpare * window_.reach;
+  const bool holds = moved_ + most_come <= lists_.lasts();
+  window_.is_known = scene_.solver.plain || !lists_.empty() || !holds;
   if (!window_.is_known) return;
   read(sheets);
   begin_ = x_ - d_;
+  if (scene_.solver.plain || !lists_.empty()) return;
+  // nothing was near: that may last
+  lists_.expect(begin_, most_come);
+  moved_ = 0;
+  window_.is_known = !lists_.empty();
 }
 
 // What may have met in the window.

@@ -1,6 +1,7 @@
 #include "core/cloth_contact/pair_lists.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -17,24 +18,30 @@ void PairLists::forget() {
 }
 
 void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now) {
-  const double thickest = cloth_.thickest, most = kMostMotion * thickest;
-  const auto length = [&](const NearBlocks::Box& box) {
-    constexpr double kRounding = 1e-12;  // m, of positions
-    const double moved = box.diagonal().norm() + kRounding;
-    return moved < most ? moved : most;
-  };
-  blocks_.set(from);
-  const double comes = length(blocks_.box_motion(from, now, in_window_));
-  double moved = most;
+  const NearBlocks::Box all = blocks_.box_motion(from, now, in_window_);
+  look(from, all);
+}
+
+void PairLists::expect(const Matrix3Xd& from, double come) {
+  const Vector3d half = Vector3d::Constant(come / (2 * std::sqrt(3.0)));
+  const NearBlocks::Box all(-half, half);
+  in_window_.assign(static_cast<std::size_t>(blocks_.blocks()), all);
+  look(from, all);
+}
+
+void PairLists::look(const Matrix3Xd& x, const NearBlocks::Box& all_in_window) {
+  const double thickest = cloth_.thickest, comes = length(all_in_window);
+  blocks_.set(x);
+  double moved = kMostMotion * thickest;
   if (before_.cols() > 0) {
-    moved = length(blocks_.box_motion(before_, from, since_));
+    moved = length(blocks_.box_motion(before_, x, since_));
     for (List& list : lists_) {
       const double by = between(since_, list.blocks);
       list.left -= by;
-      list.pruned_left -= by;
+      list.near_left -= by;
     }
   }
-  before_ = from;
+  before_ = x;
 
   constexpr double kBlocksReach = 5;  // of the thickest cloth
   met_left_ -= moved;
@@ -47,23 +54,27 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now) {
     // shares no particle there is 2.8 thicknesses apart
     list.came = between(in_window_, list.blocks);
     if (!(list.left >= list.came))
-      renew(from, list.came + std::min(2 * list.came, 0.5 * thickest) + 0.1 * thickest,
+      renew(x, list.came + std::min(2 * list.came, 0.5 * thickest) + 0.1 * thickest,
             std::max(1.6 * thickest, list.came + std::min(7 * list.came, thickest)), list);
-    if (list.is_pruned && !(list.pruned_left >= list.came))
-      prune(from, list.came + std::clamp(3 * list.came, 0.05 * thickest, 0.5 * thickest), list);
-    lasts_ = std::min(lasts_, list.is_pruned ? list.pruned_left : list.left);
-    if (!list.near().empty()) ++near_;
+    if (!list.all.empty() && !(list.near_left >= list.came))
+      prune(x, list.came + std::clamp(3 * list.came, 0.05 * thickest, 0.5 * thickest), list);
+    lasts_ = std::min(lasts_, list.all.empty() ? list.left : list.near_left);
+    if (!list.near.empty()) ++near_;
   }
+}
+
+// What all within a box moved by in relation to each other, m.
+double PairLists::length(const NearBlocks::Box& motion) const {
+  constexpr double kRounding = 1e-12;  // m, of positions
+  const double most = kMostMotion * cloth_.thickest, moved = motion.diagonal().norm() + kRounding;
+  return moved < most ? moved : most;
 }
 
 // What two blocks moved by in relation to each other, m: what each moved by lies in a box, and what
 // both moved by in one around these.
 double PairLists::between(const Motion& motion, const BlockPair& blocks) const {
-  constexpr double kRounding = 1e-12;
-  const NearBlocks::Box both = motion[static_cast<std::size_t>(blocks.one)].merged(
-      motion[static_cast<std::size_t>(blocks.other)]);
-  const double most = kMostMotion * cloth_.thickest, moved = both.diagonal().norm() + kRounding;
-  return moved < most ? moved : most;
+  return length(motion[static_cast<std::size_t>(blocks.one)].merged(
+      motion[static_cast<std::size_t>(blocks.other)]));
 }
 
 // Positions of the particles of both blocks, or of the one.
@@ -121,26 +132,21 @@ void PairLists::meet(double reach) {
 }
 
 void PairLists::renew(const Matrix3Xd& x, double least, double reach, List& list) {
-  constexpr std::size_t kWorthPruning = 32;
   if (list.made_at.cols() > 0) list.left = list.reach - change(x, list);
   if (list.left >= least) return;
-  list.all = list.pruned = {};
-  list.is_pruned = false;
+  list.all = list.near = {};
+  list.near_left = -1;
   list.made_at.resize(3, 0);
   list.left = blocks_.distance(list.blocks) - cloth_.thickest;
   if (list.left >= least) return;
   list.left = list.reach = reach;
   place(x, list.blocks, list.made_at);
-
   list.all = candidates_of(cloth_, find_pairs(cloth_, blocks_, list.blocks, x, list.reach));
-
-  list.is_pruned = list.all.size() >= kWorthPruning;
-  list.pruned_left = -1;
 }
 
 void PairLists::prune(const Matrix3Xd& x, double reach, List& list) {
-  list.pruned_left = std::min(reach, list.left);
-  list.pruned = nearer(list.all, x, reach);
+  list.near_left = std::min(reach, list.left);
+  list.near = nearer(list.all, x, reach);
 }
 
 }  // namespace weft

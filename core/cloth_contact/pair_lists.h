@@ -23,6 +23,9 @@ class PairLists {
   // the lists hold every pair that was nearer than its thickness and what its blocks have come
   // since, or kMostMotion.
   void update(const Matrix3Xd& from, const Matrix3Xd& now);
+  // The same for a window that begins at `from`, in which nothing will come farther in relation to
+  // anything else than `come`, m.
+  void expect(const Matrix3Xd& from, double come);
   // How far particles may come in relation to each other from the last `from` on until lists do
   // not hold any more, m.
   double lasts() const { return lasts_; }
@@ -36,24 +39,23 @@ class PairLists {
   template <class F>
   void for_each_list(const F& f) const {
     for (const List& list : lists_)
-      if (!list.near().empty()) f(list.blocks, list.near(), list.came);
+      if (!list.near.empty()) f(list.blocks, list.near, list.came);
   }
 
  private:
   struct List {
     BlockPair blocks;
-    double left = -1, pruned_left = -1;  // of the reach of each, m
+    double left = -1, near_left = -1;  // of the reach of all, and of what is near, m
     double reach = 0;                    // when it was made, m
     double came = 0;                     // in the window, m
     Matrix3Xd made_at = {};              // of the particles of both blocks, m; or empty
-    Candidates all = {}, pruned = {};
-    bool is_pruned = false;
-
-    const Candidates& near() const { return is_pruned ? pruned : all; }
+    Candidates all = {}, near = {};
   };
   using Motion = std::vector<NearBlocks::Box>;  // of each block, m
 
+  void look(const Matrix3Xd& x, const NearBlocks::Box& all_in_window);
   void meet(double reach);
+  double length(const NearBlocks::Box& motion) const;
   double between(const Motion& motion, const BlockPair& blocks) const;
   void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
   double change(const Matrix3Xd& x, const List& list);

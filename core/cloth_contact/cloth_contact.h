@@ -15,8 +15,8 @@ namespace weft {
 //
 // Contact acts once in a window of several steps, in which nothing moves far in relation to what it
 // is near; a window ends with its frame at the latest, so frames can be gone on from. Where it ends
-// it is known how far everything came, and so what may have met: what comes of it does not depend
-// on lists, nor on who computes them.
+// it is known how far everything came, and so what may have met, but where nothing was near enough
+// to begin with: what comes of it does not depend on lists, nor on who computes them.
 class ClothContact {
  public:
   // Holds on to the scene.

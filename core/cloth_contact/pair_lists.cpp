@@ -11,6 +11,7 @@ PairLists::PairLists(const Cloth& cloth) : cloth_(cloth), blocks_(cloth) {}
 
 void PairLists::forget() {
   before_ = {};
+  states_ = {};
   lists_ = {};
   since_ = in_window_ = {};
   near_ = 0;
@@ -35,10 +36,10 @@ void PairLists::look(const Matrix3Xd& x, const NearBlocks::Box& all_in_window) {
   double moved = kMostMotion * thickest;
   if (before_.cols() > 0) {
     moved = length(blocks_.box_motion(before_, x, since_));
-    for (List& list : lists_) {
-      const double by = between(since_, list.blocks);
-      list.left -= by;
-      list.near_left -= by;
+    for (State& state : states_) {
+      const double by = between(since_, state.blocks);
+      state.left -= by;
+      state.near_left -= by;
     }
   }
   before_ = x;
@@ -49,17 +50,18 @@ void PairLists::look(const Matrix3Xd& x, const NearBlocks::Box& all_in_window) {
 
   lasts_ = met_left_;
   near_ = 0;
-  for (List& list : lists_) {
+  for (std::size_t k = 0; k < states_.size(); ++k) {
+    State& state = states_[k];
     // some windows pass until they are looked at again; lists of flat cloth stay empty: what
     // shares no particle there is 2.8 thicknesses apart
-    list.came = between(in_window_, list.blocks);
-    if (!(list.left >= list.came))
-      renew(x, list.came + std::min(2 * list.came, 0.5 * thickest) + 0.1 * thickest,
-            std::max(1.6 * thickest, list.came + std::min(7 * list.came, thickest)), list);
-    if (!list.all.empty() && !(list.near_left >= list.came))
-      prune(x, list.came + std::clamp(3 * list.came, 0.05 * thickest, 0.5 * thickest), list);
-    lasts_ = std::min(lasts_, list.all.empty() ? list.left : list.near_left);
-    if (!list.near.empty()) ++near_;
+    const double came = state.came = between(in_window_, state.blocks);
+    if (!(state.left >= came))
+      renew(x, came + std::min(2 * came, 0.5 * thickest) + 0.1 * thickest,
+            std::max(1.6 * thickest, came + std::min(7 * came, thickest)), state, lists_[k]);
+    if (state.has_some && !(state.near_left >= came))
+      prune(x, came + std::clamp(3 * came, 0.05 * thickest, 0.5 * thickest), state, lists_[k]);
+    lasts_ = std::min(lasts_, state.has_some ? state.near_left : state.left);
+    if (state.is_near) ++near_;
   }
 }
 
@@ -90,8 +92,8 @@ void PairLists::place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at
 
 // By how much distances within both blocks have changed since their list was made, at most, m: by
 // no more than what each particle moved by beside a rotation of all lies within.
-double PairLists::change(const Matrix3Xd& x, const List& list) {
-  place(x, list.blocks, now_);
+double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List& list) {
+  place(x, blocks, now_);
   const Eigen::Index last = now_.cols() - 1, half = last / 2;
   // any that turns with the cloth
   const auto frame = [&](const Matrix3Xd& at) -> Eigen::Matrix3d {
@@ -119,34 +121,36 @@ double PairLists::change(const Matrix3Xd& x, const List& list) {
 
 // Keeps the lists of blocks that have met before.
 void PairLists::meet(double reach) {
-  std::vector<List> old = std::exchange(lists_, {});
-  auto known = old.begin();
+  const std::vector<State> old_states = std::exchange(states_, {});
+  std::vector<List> old_lists = std::exchange(lists_, {});
+  std::size_t known = 0;
   for (const BlockPair& blocks : blocks_.meet(cloth_.thickest + reach)) {
-    while (known != old.end() && known->blocks < blocks) ++known;
-    if (known != old.end() && known->blocks == blocks)
-      lists_.push_back(std::move(*known));
-    else
-      lists_.push_back({blocks});
+    while (known < old_states.size() && old_states[known].blocks < blocks) ++known;
+    const bool is_known = known < old_states.size() && old_states[known].blocks == blocks;
+    states_.push_back(is_known ? old_states[known] : State{blocks});
+    lists_.push_back(is_known ? std::move(old_lists[known]) : List{});
   }
   met_left_ = reach;
 }
 
-void PairLists::renew(const Matrix3Xd& x, double least, double reach, List& list) {
-  if (list.made_at.cols() > 0) list.left = list.reach - change(x, list);
-  if (list.left >= least) return;
-  list.all = list.near = {};
-  list.near_left = -1;
-  list.made_at.resize(3, 0);
-  list.left = blocks_.distance(list.blocks) - cloth_.thickest;
-  if (list.left >= least) return;
-  list.left = list.reach = reach;
-  place(x, list.blocks, list.made_at);
-  list.all = candidates_of(cloth_, find_pairs(cloth_, blocks_, list.blocks, x, list.reach));
+void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& state, List& list) {
+  if (list.made_at.cols() > 0) state.left = list.reach - change(x, state.blocks, list);
+  if (state.left >= least) return;
+  list = {};
+  state.has_some = state.is_near = false;
+  state.near_left = -1;
+  state.left = blocks_.distance(state.blocks) - cloth_.thickest;
+  if (state.left >= least) return;
+  state.left = list.reach = reach;
+  place(x, state.blocks, list.made_at);
+  list.all = candidates_of(cloth_, find_pairs(cloth_, blocks_, state.blocks, x, reach));
+  state.has_some = !list.all.empty();
 }
 
-void PairLists::prune(const Matrix3Xd& x, double reach, List& list) {
-  list.near_left = std::min(reach, list.left);
+void PairLists::prune(const Matrix3Xd& x, double reach, State& state, List& list) {
+  state.near_left = std::min(reach, state.left);
   list.near = nearer(list.all, x, reach);
+  state.is_near = !list.near.empty();
 }
 
 }  // namespace weft

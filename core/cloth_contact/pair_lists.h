@@ -34,21 +34,25 @@ class PairLists {
   static constexpr double kMostMotion = 8;
 
   bool empty() const { return near_ == 0; }
-  // Calls f(blocks, candidates, how far they came in the last window that was asked for, m) for
+  // Calls f(blocks, candidates, how far they came in relation to each other in the window, m) for
   // every list that has some, in an order that depends on the blocks alone.
   template <class F>
   void for_each_list(const F& f) const {
-    for (const List& list : lists_)
-      if (!list.near.empty()) f(list.blocks, list.near, list.came);
+    for (std::size_t k = 0; k < states_.size(); ++k)
+      if (states_[k].is_near) f(states_[k].blocks, lists_[k].near, states_[k].came);
   }
 
  private:
-  struct List {
+  // What is looked at in every window, and what in some.
+  struct State {
     BlockPair blocks;
     double left = -1, near_left = -1;  // of the reach of all, and of what is near, m
-    double reach = 0;                    // when it was made, m
-    double came = 0;                     // in the window, m
-    Matrix3Xd made_at = {};              // of the particles of both blocks, m; or empty
+    double came = 0;                   // in the window, m
+    bool has_some = false, is_near = false;
+  };
+  struct List {
+    double reach = 0;        // when it was made, m
+    Matrix3Xd made_at = {};  // of the particles of both blocks, m; or empty
     Candidates all = {}, near = {};
   };
   using Motion = std::vector<NearBlocks::Box>;  // of each block, m
@@ -58,17 +62,18 @@ class PairLists {
   double length(const NearBlocks::Box& motion) const;
   double between(const Motion& motion, const BlockPair& blocks) const;
   void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
-  double change(const Matrix3Xd& x, const List& list);
-  void renew(const Matrix3Xd& x, double least, double reach, List& list);
-  void prune(const Matrix3Xd& x, double reach, List& list);
+  double change(const Matrix3Xd& x, const BlockPair& blocks, const List& list);
+  void renew(const Matrix3Xd& x, double least, double reach, State& state, List& list);
+  static void prune(const Matrix3Xd& x, double reach, State& state, List& list);
 
   const Cloth& cloth_;
   NearBlocks blocks_;
-  Matrix3Xd before_;         // where the window of the last update began, m; or empty
-  double met_left_ = -1;     // of the reach that blocks were met with, m
-  double lasts_ = -1;        // m
-  std::vector<List> lists_;  // in ascending order of blocks
-  std::size_t near_ = 0;     // lists that have some
+  Matrix3Xd before_;           // where the window of the last update began, m; or empty
+  double met_left_ = -1;       // of the reach that blocks were met with, m
+  double lasts_ = -1;          // m
+  std::vector<State> states_;  // in ascending order of blocks
+  std::vector<List> lists_;    // of these
+  std::size_t near_ = 0;       // lists that have some
   Motion since_, in_window_;
   Matrix3Xd now_;
 };

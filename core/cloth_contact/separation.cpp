@@ -12,8 +12,9 @@
 namespace weft {
 namespace {
 
-constexpr int kMostPasses = 20;
-constexpr double kSmall = 5e-4;      // of thickness: what others need not answer
+constexpr int kMostPasses = 12;
+// of thickness: what others need not answer; the next window begins with what was given in this one
+constexpr double kSmall = 1e-4;
 constexpr double kDepthShare = 0.2;  // of its depth that a pair is moved apart
 
 std::size_t hash(const std::array<int, 4>& particle) {
@@ -56,13 +57,13 @@ void Separation::touch(bool edges, std::span<const NearCloth> near, const Surrou
   };
   const auto of_kind = [&](std::size_t n) { return edges ? near[n].edges : near[n].corners; };
   for (std::size_t n = 0; n < near.size(); ++n) {
-    const NearCloth& cloth = near[n];
-    constexpr std::size_t kAhead = 4;
+    // lists lie anywhere in memory
+    constexpr std::size_t kAhead = 4, kInLine = 2;
     if (n + kAhead < near.size()) {
-      const char* ahead = reinterpret_cast<const char*>(of_kind(n + kAhead).data());
-      for (std::size_t byte = 0; byte < of_kind(n + kAhead).size_bytes(); byte += 64)
-        hwy::Prefetch(ahead + byte);
+      const std::span<const Candidate> ahead = of_kind(n + kAhead);
+      for (std::size_t k = 0; k < ahead.size(); k += kInLine) hwy::Prefetch(&ahead[k]);
     }
+    const NearCloth& cloth = near[n];
     for (const Candidate& candidate : of_kind(n)) {
       const auto& [i, j, k, l] = candidate.particle;
       waiting[batch.size()] = {&candidate, candidate.thickness + cloth.come, cloth.friction};
@@ -82,52 +83,57 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   const auto mover = [&](std::size_t n) -> const Mover& {
     return around.movers[static_cast<std::size_t>(candidate.particle[n])];
   };
-  double come = 0, in_step = 0;  // squared
-  const std::size_t ends = edges ? 2 : 1;
-  for (std::size_t m = 0; m < ends; ++m)
-    for (std::size_t n = ends; n < 4; ++n) {
-      come = std::max(come, (mover(m).way - mover(n).way).squaredNorm());
-      in_step = std::max(in_step, (mover(m).in_step - mover(n).in_step).squaredNorm());
-    }
-  if (!(distance < candidate.thickness + std::min(std::sqrt(come), around.most))) return;
+  // of all of the one to all of the other, m^2
+  const auto farthest = [&](Eigen::Vector4d Mover::*motion) {
+    double most = 0;
+    const std::size_t ends = edges ? 2 : 1;
+    for (std::size_t m = 0; m < ends; ++m)
+      for (std::size_t n = ends; n < 4; ++n)
+        most = std::max(most, (mover(m).*motion - mover(n).*motion).squaredNorm());
+    return most;
+  };
+  const double room = distance - candidate.thickness, most_room = around.most;
+  if (room >= most_room || (room > 0 && room * room >= farthest(&Mover::way))) return;
   if (!around.untangling.empty() && around.untangling.has(candidate.particle)) return;
 
-  Contact contact;
+  std::array<double, 4> share;
+  double moves = 0;  // 1/kg, of what the pair moves
+  for (std::size_t n = 0; n < 4; ++n) {
+    share[n] = weight[n] * around.inverse_mass[static_cast<std::size_t>(candidate.particle[n])];
+    moves += weight[n] * share[n];
+  }
+  if (moves == 0) return;
+  for (double& part : share) part /= moves;
+  const double reach =
+      std::max(std::min(distance / 2, candidate.thickness / 4), kLeastReach * candidate.thickness);
+  const double in_step = farthest(&Mover::in_step);
+  if (in_step * most_steps_ * most_steps_ > reach * reach) most_steps_ = reach / std::sqrt(in_step);
+
+  Contact& contact = contacts_.emplace_back();
   contact.particle = candidate.particle;
   contact.edges = edges;
   contact.weight = weight;
-  contact.normal.setZero();
-  contact.distance = distance;
+  contact.share = share;
+  contact.normal << apart / distance, 0;
+  contact.room = room;
   contact.thickness = candidate.thickness;
   contact.friction = friction;
-  contact.looked_at = -1;
-  contact.normal.head<3>() = apart / distance;
-  double moves = 0;  // 1/kg, of what the pair moves
-  for (std::size_t n = 0; n < 4; ++n) {
-    contact.share[n] =
-        weight[n] * around.inverse_mass[static_cast<std::size_t>(candidate.particle[n])];
-    moves += weight[n] * contact.share[n];
-  }
-  if (moves == 0) return;
-  for (double& share : contact.share) share /= moves;
-  const double reach =
-      std::max(std::min(distance / 2, candidate.thickness / 4), kLeastReach * candidate.thickness);
-  if (in_step * most_steps_ * most_steps_ > reach * reach) most_steps_ = reach / std::sqrt(in_step);
-  contacts_.push_back(contact);
 }
 
 // Those are looked at again whose particles others have moved.
 void Separation::separate(double steps, std::span<Mover> movers) {
   // what was given the last time
+  std::size_t next = 0;  // most pairs come in the order in which they came then
   for (Contact& contact : contacts_) {
-    const Contact* given = find_given(contact);
-    if (given == nullptr) continue;
+    const std::size_t found = find_given(contact, next);
+    if (found == given_.size()) continue;
+    next = found + 1;
     const Eigen::Vector4d& normal = contact.normal;
     const auto turned = [&](const Change& change) -> Change {
       return {change.along, change.sliding - change.sliding.dot(normal) * normal};
     };
-    contact.way = turned(given->way);
-    contact.in_step = turned(given->in_step);
+    contact.way = turned(given_[found].way);
+    contact.in_step = turned(given_[found].in_step);
     const Eigen::Vector4d way = contact.way.along * normal + contact.way.sliding,
                           in_step = contact.in_step.along * normal + contact.in_step.sliding;
     for (std::size_t n = 0; n < 4; ++n) {
@@ -157,6 +163,20 @@ void Separation::separate(double steps, std::span<Mover> movers) {
   keep_given();
 }
 
+// What a motion lacks to be at least `least` along the normal, and without sliding as far as
+// friction by what is given beyond `free` holds that; some of what was given may be taken back. m
+Eigen::Vector4d Separation::give(const Eigen::Vector4d& motion, const Eigen::Vector4d& normal,
+                                 double least, double friction, double free, Change& given) {
+  const double along = motion.dot(normal), before = given.along;
+  given.along = std::max(before + least - along, 0.0);
+  Eigen::Vector4d sliding = given.sliding - (motion - along * normal);
+  const double most = friction * std::max(given.along - free, 0.0), length = sliding.norm();
+  if (length > most) sliding *= most / length;
+  const Eigen::Vector4d by = (given.along - before) * normal + sliding - given.sliding;
+  given.sliding = sliding;
+  return by;
+}
+
 // Returns how far it was from what it is to be, m.
 double Separation::separate(double steps, Contact& contact, std::span<Mover> movers) {
   const auto mover = [&](std::size_t n) -> Mover& {
@@ -169,39 +189,25 @@ double Separation::separate(double steps, Contact& contact, std::span<Mover> mov
   }
 
   const Eigen::Vector4d& normal = contact.normal;
-  const double depth = std::max(contact.thickness - contact.distance, 0.0),
-               room = std::max(contact.distance - contact.thickness, 0.0);
-  const double missing = kDepthShare * depth;
-  // friction by what is given beyond `free`, m
-  const auto change = [&](const Eigen::Vector4d& motion, double along, double least, double free,
-                          Change& given) -> Eigen::Vector4d {
-    const double before = given.along;
-    given.along = std::max(before + least - along, 0.0);
-    Eigen::Vector4d by = (given.along - before) * normal;
-    const Eigen::Vector4d held = given.sliding - (motion - along * normal);
-    const double most = contact.friction * std::max(given.along - free, 0.0), length = held.norm();
-    const Eigen::Vector4d sliding = length > most ? Eigen::Vector4d(most / length * held) : held;
-    by += sliding - given.sliding;
-    given.sliding = sliding;
-    return by;
-  };
+  const double missing = kDepthShare * std::max(-contact.room, 0.0),
+               least = missing - std::max(contact.room, 0.0);
   // no nearer than the thickness, or than where it set out, and from there on out
   const double come = way.dot(normal), speed = in_step.dot(normal);
-  const double along_before = contact.way.along, brake_before = contact.in_step.along;
-  if (come >= missing - room &&
-      speed >= -std::max(contact.distance + come - contact.thickness, 0.0) / steps &&
-      along_before == 0 && brake_before == 0)
-    return 0;
-  const Eigen::Vector4d by = change(way, come, missing - room, missing, contact.way);
-  const double pushed = contact.way.along - along_before;
+  const auto allowed = [&](double come_by) {
+    return -std::max(contact.room + come_by, 0.0) / steps;
+  };
+  const double pushed_before = contact.way.along, braked_before = contact.in_step.along;
+  if (come >= least && speed >= allowed(come) && pushed_before == 0 && braked_before == 0) return 0;
+  const Eigen::Vector4d by = give(way, normal, least, contact.friction, missing, contact.way);
+  const double pushed = contact.way.along - pushed_before;
   // nor in the steps to come
-  const double left = std::max(contact.distance + come + pushed - contact.thickness, 0.0);
-  const Eigen::Vector4d braked = change(in_step, speed, -left / steps, 0, contact.in_step);
+  const Eigen::Vector4d braked =
+      give(in_step, normal, allowed(come + pushed), contact.friction, 0, contact.in_step);
   for (std::size_t n = 0; n < 4; ++n) {
     mover(n).way += contact.share[n] * by;
     mover(n).in_step += contact.share[n] * braked;
   }
-  return std::max(std::abs(pushed), std::abs(contact.in_step.along - brake_before) * steps);
+  return std::max(std::abs(pushed), std::abs(contact.in_step.along - braked_before) * steps);
 }
 
 void Separation::forget_given() {
@@ -212,7 +218,8 @@ void Separation::forget_given() {
 void Separation::keep_given() {
   given_.clear();
   for (const Contact& contact : contacts_)
-    if (contact.way.along > 0 || contact.in_step.along > 0) given_.push_back(contact);
+    if (contact.way.along > 0 || contact.in_step.along > 0)
+      given_.push_back({contact.particle, contact.edges, contact.way, contact.in_step});
   place_.assign(std::bit_ceil(2 * given_.size() + 1), 0);
   for (std::size_t k = 0; k < given_.size(); ++k) {
     std::size_t at = hash(given_[k].particle);
@@ -221,13 +228,17 @@ void Separation::keep_given() {
   }
 }
 
-const Separation::Contact* Separation::find_given(const Contact& contact) const {
-  if (given_.empty()) return nullptr;
+// Its place in given_, or the size of that. First looks at `next`.
+std::size_t Separation::find_given(const Contact& contact, std::size_t next) const {
+  const auto is = [&](const Given& given) {
+    return given.particle == contact.particle && given.edges == contact.edges;
+  };
+  if (next < given_.size() && is(given_[next])) return next;
+  if (given_.empty()) return 0;
   for (std::size_t at = hash(contact.particle);; ++at) {
     const std::uint32_t k = place_[at & (place_.size() - 1)];
-    if (k == 0) return nullptr;
-    const Contact& given = given_[k - 1];
-    if (given.particle == contact.particle && given.edges == contact.edges) return &given;
+    if (k == 0) return given_.size();
+    if (is(given_[k - 1])) return k - 1;
   }
 }
 

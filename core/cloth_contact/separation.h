@@ -57,13 +57,19 @@ class Separation {
   // Weights lead from the second one's nearest point to the first one's; shares are what particles
   // have of the pair's motion.
   struct Contact {
+    std::array<int, 4> particle = {};
+    bool edges = false;
+    int looked_at = -1;  // when
+    std::array<double, 4> weight = {}, share = {};
+    Eigen::Vector4d normal = {};
+    double room = 0;                     // to its thickness, where it set out, m
+    double thickness = 0, friction = 0;  // m, 1
+    Change way = {}, in_step = {};       // that it has given, m
+  };
+  struct Given {
     std::array<int, 4> particle;
     bool edges;
-    std::array<double, 4> weight, share;
-    Eigen::Vector4d normal;
-    double distance, thickness, friction;  // m, m, 1
-    Change way, in_step;                   // that it has given, m
-    int looked_at;                         // when
+    Change way, in_step;
   };
   struct Surroundings {
     const Untangling& untangling;
@@ -76,12 +82,14 @@ class Separation {
   void touch(bool edges, std::span<const NearCloth> near, const Surroundings& around);
   void add(bool edges, const Candidate& candidate, const std::array<double, 4>& weight,
            const Vector3d& apart, double distance, double friction, const Surroundings& around);
+  static Eigen::Vector4d give(const Eigen::Vector4d& motion, const Eigen::Vector4d& normal,
+                              double least, double friction, double free, Change& given);
   static double separate(double steps, Contact& contact, std::span<Mover> movers);
-  const Contact* find_given(const Contact& contact) const;
+  std::size_t find_given(const Contact& contact, std::size_t next) const;
   void keep_given();
 
   std::vector<Contact> contacts_;
-  std::vector<Contact> given_;        // the last time, of pairs that gave something
+  std::vector<Given> given_;          // the last time, of pairs that gave something
   std::vector<std::uint32_t> place_;  // in given_ and one more, by hash of the pair; 0: none
   std::vector<int> changed_;          // when, of each mover
   double most_steps_ = 0;

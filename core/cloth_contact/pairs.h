@@ -32,9 +32,9 @@ struct Candidate {
 struct Candidates {
   std::vector<Candidate> corners, edges;
 
-  std::size_t size() const { return corners.size() + edges.size(); }
   bool empty() const { return corners.empty() && edges.empty(); }
 };
+
 Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs);
 // Those that are nearer to each other at x, (3 x particles) m, than their thickness and `reach`, m.
 Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach);

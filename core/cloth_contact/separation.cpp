@@ -92,8 +92,8 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
         most = std::max(most, (mover(m).*motion - mover(n).*motion).squaredNorm());
     return most;
   };
-  const double room = distance - candidate.thickness, most_room = around.most;
-  if (room >= most_room || (room > 0 && room * room >= farthest(&Mover::way))) return;
+  const double room = distance - candidate.thickness;
+  if (room >= around.most || (room > 0 && room * room >= farthest(&Mover::way))) return;
   if (!around.untangling.empty() && around.untangling.has(candidate.particle)) return;
 
   std::array<double, 4> share;

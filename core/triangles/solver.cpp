@@ -214,12 +214,12 @@ class TriangleSolver : public SheetSolver {
   }
 
   Vector3d exact(const AlignedArray<T>& plane, const AlignedArray<T>& error, std::size_t at) const {
-    const auto values = [&](const AlignedArray<T>& from) -> Eigen::Vector4d {
-      return Eigen::Map<const Eigen::Matrix<T, 4, 1>>(from.data() + at).template cast<double>();
-    };
-    Eigen::Vector4d v = values(plane);
-    if (law_.compensated) v -= values(error);
-    return v.template head<3>();
+    Vector3d v;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      double& value = v[static_cast<Eigen::Index>(axis)] = double{plane.data()[at + axis]};
+      if (law_.compensated) value -= double{error.data()[at + axis]};
+    }
+    return v;
   }
   Vector3d position_at(std::size_t at) const {
     return origin_ + exact(state_.x, state_.x_error, at);

@@ -46,9 +46,14 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
   if (!ends_frame && window_.steps < window_.most_steps && come_ + in_step <= window_.reach) return;
 
   const bool is_known = window_.is_known;
+  // the begin of a window of one step told where it ends, unless pairs are led apart meanwhile
+  const bool is_read = window_.steps == 1 && untangling_.empty();
   window_ = {.most_steps = ends_frame ? 1 : std::max(1, static_cast<int>(kWindowTime / dt))};
   untangling_.lead(sheets, dt);
-  if (is_known) act(sheets, ends_frame);
+  if (is_known) {
+    if (!is_read) read(sheets);
+    act(sheets, ends_frame);
+  }
   if (ends_frame) separation_.forget_given();
 }
 
@@ -104,7 +109,6 @@ void ClothContact::find_near() {
 }
 
 void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame) {
-  read(sheets);
   find_near();
   set_out();
   separation_.touch(near_, untangling_, begin_, inverse_mass_, movers_,

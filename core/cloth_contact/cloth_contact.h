@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/cloth_contact/pair_lists.h"
@@ -13,10 +14,10 @@ namespace weft {
 // Keeps cloth from passing through cloth: particles from triangles and edges from edges, of one
 // sheet or of two (separation.h).
 //
-// Contact acts once in a window of several steps, in which nothing moves far in relation to
-// anything else; a window ends with its frame at the latest, so frames can be gone on from. What
-// may be near each other is listed where a window begins, so what comes of it does not depend on
-// lists, nor on who computes them.
+// Contact acts once in a window of several steps, in which nothing moves far in relation to what it
+// is near; a window ends with its frame at the latest, so frames can be gone on from. Where it ends
+// it is known how far everything came, and so what may have met, but where nothing was near enough
+// to begin with: what comes of it does not depend on lists, nor on who computes them.
 class ClothContact {
  public:
   // Holds on to the scene.
@@ -38,15 +39,13 @@ class ClothContact {
   // Steps after which contact acts once.
   struct Window {
     int steps = 0, most_steps = 1;
-    double reach = 0;  // of relative motion in it, m
+    double reach = 0;       // of motion in it, in relation to anything else, m
+    bool is_known = false;  // where it began
   };
 
   void begin_window(std::span<MovingSheet> sheets, double in_step);
-  void update_lists(std::span<MovingSheet> sheets, double margin, double in_step);
-  template <class Lists>
-  void take(const Lists& for_each_list);
-  template <class F>
-  void for_each_run(const F& f) const;
+  void act(std::span<MovingSheet> sheets, bool ends_frame);
+  void find_near();
   void read(std::span<MovingSheet> sheets);
   void set_out();
   void write(std::span<MovingSheet> sheets);
@@ -54,22 +53,19 @@ class ClothContact {
   const Scene& scene_;
   Cloth cloth_;
   PairLists lists_;
+  std::vector<std::pair<BlockPair, Candidates>> all_;  // where no lists are kept
+  std::vector<NearCloth> near_;
   Window window_;
-  // in relation to each other: since where the window began, and from the last update of the lists
+  // in relation to each other: since where the window began, and from where lists were looked at
   // until there, m
   double come_ = 0, moved_ = 0;
 
-  Matrix3Xd all_, one_sheet_;  // positions of all particles, of those of a sheet, m
-  std::vector<ContactCandidate> candidates_;
-  std::vector<int> place_;            // of each particle among particles_, or -1
-  std::vector<int> particles_;        // that candidates have, ascending
-  std::vector<int> own_number_;       // in their sheets
-  std::vector<double> inverse_mass_;  // of these, 1/kg
+  std::vector<double> inverse_mass_;  // of all particles, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m
   Separation separation_;
   Untangling untangling_;
   std::vector<Mover> movers_;
-  std::vector<int> changed_;  // of a sheet, by its own numbers
+  std::vector<int> own_number_, changed_;  // of a sheet, by its own numbers
 };
 
 }  // namespace weft

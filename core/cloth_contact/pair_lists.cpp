@@ -1,6 +1,7 @@
 #include "core/cloth_contact/pair_lists.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -10,66 +11,72 @@ PairLists::PairLists(const Cloth& cloth) : cloth_(cloth), blocks_(cloth) {}
 
 void PairLists::forget() {
   before_ = {};
+  states_ = {};
   lists_ = {};
-  motion_ = {};
+  since_ = in_window_ = {};
+  near_ = 0;
   met_left_ = lasts_ = -1;
 }
 
-bool PairLists::update(const Matrix3Xd& x, double margin, double step) {
-  // until now, where it is not known better
-  const Vector3d half = Vector3d::Constant(std::min(step, kMostMotion * cloth_.thickest) / 2);
-  // faster than that they are looked at in every step
-  step = std::min(step, cloth_.thickest);
-  // some steps pass until they are looked at again; lists of flat cloth stay empty: what shares no
-  // particle there is 2.8 thicknesses apart
-  const double least = margin + std::max(3 * step, 0.25 * cloth_.thickest),
-               reach = std::max(1.6 * cloth_.thickest, 1.5 * least),
-               least_pruned = margin + std::max(2 * step, 0.1 * cloth_.thickest),
-               pruned_reach = least_pruned + 0.2 * cloth_.thickest;
+void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now) {
+  const NearBlocks::Box all = blocks_.box_motion(from, now, in_window_);
+  look(from, all);
+}
+
+void PairLists::expect(const Matrix3Xd& from, double come) {
+  const Vector3d half = Vector3d::Constant(come / (2 * std::sqrt(3.0)));
+  const NearBlocks::Box all(-half, half);
+  in_window_.assign(static_cast<std::size_t>(blocks_.blocks()), all);
+  look(from, all);
+}
+
+void PairLists::look(const Matrix3Xd& x, const NearBlocks::Box& all_in_window) {
+  const double thickest = cloth_.thickest, comes = length(all_in_window);
   blocks_.set(x);
-  NearBlocks::Box all(-half, half);
+  double moved = kMostMotion * thickest;
   if (before_.cols() > 0) {
-    all = blocks_.box_motion(before_, x, motion_);
-    for (List& list : lists_) {
-      const double moved = motion(list.blocks);
-      list.left -= moved;
-      list.pruned_left -= moved;
+    moved = length(blocks_.box_motion(before_, x, since_));
+    for (State& state : states_) {
+      const double by = between(since_, state.blocks);
+      state.left -= by;
+      state.near_left -= by;
     }
-  } else {
-    motion_.assign(static_cast<std::size_t>(blocks_.blocks()), all);
   }
   before_ = x;
 
-  constexpr double kBlocksReach = 8;  // as far as that of lists
-  const double most = kMostMotion * cloth_.thickest, moved = std::min(all.diagonal().norm(), most);
+  constexpr double kBlocksReach = 5;  // of the thickest cloth
   met_left_ -= moved;
-  if (!(met_left_ >= least)) meet(kBlocksReach * reach + moved);
+  if (!(met_left_ >= comes)) meet(std::max(kBlocksReach * thickest, 4 * comes));
 
-  bool changed = false;
   lasts_ = met_left_;
-  for (List& list : lists_) {
-    // what was near before this motion is near enough now
-    if (!(list.left >= least)) {
-      const bool had_none = list.near().empty();
-      renew(x, least, reach, list);
-      changed = changed || !had_none || !list.near().empty();
-    }
-    if (list.is_pruned && !(list.pruned_left >= least_pruned)) {
-      prune(x, pruned_reach + motion(list.blocks), list);
-      changed = true;
-    }
-    lasts_ = std::min(lasts_, list.is_pruned ? list.pruned_left : list.left);
+  near_ = 0;
+  for (std::size_t k = 0; k < states_.size(); ++k) {
+    State& state = states_[k];
+    // some windows pass until they are looked at again; lists of flat cloth stay empty: what
+    // shares no particle there is 2.8 thicknesses apart
+    const double came = state.came = between(in_window_, state.blocks);
+    if (!(state.left >= came))
+      renew(x, came + std::min(2 * came, 0.5 * thickest) + 0.1 * thickest,
+            std::max(1.6 * thickest, came + std::min(7 * came, thickest)), state, lists_[k]);
+    if (state.has_some && !(state.near_left >= came))
+      prune(x, came + std::clamp(3 * came, 0.05 * thickest, 0.5 * thickest), state, lists_[k]);
+    lasts_ = std::min(lasts_, state.has_some ? state.near_left : state.left);
+    if (state.is_near) ++near_;
   }
-  return changed;
 }
 
-// Of two blocks since the last update in relation to each other, m: what each moved by lies in a
-// box, and what both moved by in one around these.
-double PairLists::motion(const BlockPair& blocks) const {
-  const NearBlocks::Box both = motion_[static_cast<std::size_t>(blocks.one)].merged(
-      motion_[static_cast<std::size_t>(blocks.other)]);
-  const double most = kMostMotion * cloth_.thickest, moved = both.diagonal().norm();
+// What all within a box moved by in relation to each other, m.
+double PairLists::length(const NearBlocks::Box& motion) const {
+  constexpr double kRounding = 1e-12;  // m, of positions
+  const double most = kMostMotion * cloth_.thickest, moved = motion.diagonal().norm() + kRounding;
   return moved < most ? moved : most;
+}
+
+// What two blocks moved by in relation to each other, m: what each moved by lies in a box, and what
+// both moved by in one around these.
+double PairLists::between(const Motion& motion, const BlockPair& blocks) const {
+  return length(motion[static_cast<std::size_t>(blocks.one)].merged(
+      motion[static_cast<std::size_t>(blocks.other)]));
 }
 
 // Positions of the particles of both blocks, or of the one.
@@ -85,8 +92,8 @@ void PairLists::place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at
 
 // By how much distances within both blocks have changed since their list was made, at most, m: by
 // no more than what each particle moved by beside a rotation of all lies within.
-double PairLists::change(const Matrix3Xd& x, const List& list) {
-  place(x, list.blocks, now_);
+double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List& list) {
+  place(x, blocks, now_);
   const Eigen::Index last = now_.cols() - 1, half = last / 2;
   // any that turns with the cloth
   const auto frame = [&](const Matrix3Xd& at) -> Eigen::Matrix3d {
@@ -114,44 +121,36 @@ double PairLists::change(const Matrix3Xd& x, const List& list) {
 
 // Keeps the lists of blocks that have met before.
 void PairLists::meet(double reach) {
-  std::vector<List> old = std::exchange(lists_, {});
-  auto known = old.begin();
+  const std::vector<State> old_states = std::exchange(states_, {});
+  std::vector<List> old_lists = std::exchange(lists_, {});
+  std::size_t known = 0;
   for (const BlockPair& blocks : blocks_.meet(cloth_.thickest + reach)) {
-    while (known != old.end() && known->blocks < blocks) ++known;
-    if (known != old.end() && known->blocks == blocks)
-      lists_.push_back(std::move(*known));
-    else
-      lists_.push_back({blocks});
+    while (known < old_states.size() && old_states[known].blocks < blocks) ++known;
+    const bool is_known = known < old_states.size() && old_states[known].blocks == blocks;
+    states_.push_back(is_known ? old_states[known] : State{blocks});
+    lists_.push_back(is_known ? std::move(old_lists[known]) : List{});
   }
   met_left_ = reach;
 }
 
-void PairLists::renew(const Matrix3Xd& x, double least, double reach, List& list) {
-  constexpr std::size_t kWorthPruning = 32;
-  constexpr double kWorth = 1.2;  // of what it is to last at least
-  const double moved = motion(list.blocks);
-  if (list.made_at.cols() > 0) list.left = list.reach - change(x, list);
-  if (list.left >= kWorth * least) return;
-  list.pairs = list.pruned = {};
-  list.is_pruned = false;
-  list.made_at.resize(3, 0);
-  list.left = blocks_.distance(list.blocks) - cloth_.thickest;
-  if (list.left >= kWorth * least + moved) return;
-  list.left = list.reach = reach + moved;
-  place(x, list.blocks, list.made_at);
-  list.pairs = find_pairs(cloth_, blocks_, list.blocks, x, list.reach);
-  list.is_pruned = list.pairs.corners.size() + list.pairs.edges.size() >= kWorthPruning;
-  list.pruned_left = -1;
+void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& state, List& list) {
+  if (list.made_at.cols() > 0) state.left = list.reach - change(x, state.blocks, list);
+  if (state.left >= least) return;
+  list = {};
+  state.has_some = state.is_near = false;
+  state.near_left = -1;
+  state.left = blocks_.distance(state.blocks) - cloth_.thickest;
+  if (state.left >= least) return;
+  state.left = list.reach = reach;
+  place(x, state.blocks, list.made_at);
+  list.all = candidates_of(cloth_, find_pairs(cloth_, blocks_, state.blocks, x, reach));
+  state.has_some = !list.all.empty();
 }
 
-void PairLists::prune(const Matrix3Xd& x, double reach, List& list) {
-  list.pruned_left = std::min(reach, list.left);
-  list.pruned.corners.clear();
-  list.pruned.edges.clear();
-  for (const ClothPair& pair : list.pairs.corners)
-    if (near_corner(cloth_, x, pair.first, pair.second, reach)) list.pruned.corners.push_back(pair);
-  for (const ClothPair& pair : list.pairs.edges)
-    if (near_edges(cloth_, x, pair.first, pair.second, reach)) list.pruned.edges.push_back(pair);
+void PairLists::prune(const Matrix3Xd& x, double reach, State& state, List& list) {
+  state.near_left = std::min(reach, state.left);
+  list.near = nearer(list.all, x, reach);
+  state.is_near = !list.near.empty();
 }
 
 }  // namespace weft

@@ -7,10 +7,11 @@
 
 namespace weft {
 
-// The pairs that may act before long, kept in lists (Verlet 1967), one for each two blocks that are
-// near each other. A list has what was nearer than its thickness and some reach when it was made,
-// and of that what was nearer still when it was pruned (Pall & Hess 2013); it holds until these two
-// blocks have moved as far in relation to each other, however far they came together.
+// The pairs that may have met in a window of steps, kept in lists (Verlet 1967), one for each two
+// blocks that are near each other. A list has what was nearer than its thickness and some reach
+// when it was made, and of that what was nearer still when it was pruned (Pall & Hess 2013); it
+// holds until these two blocks have moved as far in relation to each other, however far they came
+// together.
 class PairLists {
  public:
   explicit PairLists(const Cloth& cloth);
@@ -18,49 +19,62 @@ class PairLists {
   void forget();
   // For others to ask, between updates.
   NearBlocks& blocks() { return blocks_; }
-  // How far particles may move in relation to each other until lists are looked at again, m.
+  // Cloth was at `from` when a window began, and came to where it is now, (3 x particles) m. Has
+  // the lists hold every pair that was nearer than its thickness and what its blocks have come
+  // since, or kMostMotion.
+  void update(const Matrix3Xd& from, const Matrix3Xd& now);
+  // The same for a window that begins at `from`, in which nothing will come farther in relation to
+  // anything else than `come`, m.
+  void expect(const Matrix3Xd& from, double come);
+  // How far particles may come in relation to each other from the last `from` on until lists do
+  // not hold any more, m.
   double lasts() const { return lasts_; }
-  // Of the thickest cloth; pairs that came farther since the last update may be missed.
+  // Of the thickest cloth; pairs that came farther in a window, or since the last update, may be
+  // missed.
   static constexpr double kMostMotion = 8;
-  // Cloth is at x now, (3 x particles) m, and may come as far as `step` (m) in a step in relation
-  // to anything else. Has the lists hold every pair that is nearer than its thickness and `margin`
-  // (m), or was since the last update, or will be as long as nothing moves farther than lasts()
-  // less the margin in relation to anything else. Whether other pairs are near than before.
-  bool update(const Matrix3Xd& x, double margin, double step);
 
-  // Calls f(pairs) for every list, in an order that depends on the blocks alone.
+  bool empty() const { return near_ == 0; }
+  // Calls f(blocks, candidates, how far they came in relation to each other in the window, m) for
+  // every list that has some, in an order that depends on the blocks alone.
   template <class F>
   void for_each_list(const F& f) const {
-    for (const List& list : lists_)
-      if (!list.near().empty()) f(list.near());
+    for (std::size_t k = 0; k < states_.size(); ++k)
+      if (states_[k].is_near) f(states_[k].blocks, lists_[k].near, states_[k].came);
   }
 
  private:
-  struct List {
+  // What is looked at in every window, and what in some.
+  struct State {
     BlockPair blocks;
-    double left = -1, pruned_left = -1;  // of the reach of each, m
-    double reach = 0;                    // when it was made, m
-    Matrix3Xd made_at = {};              // of the particles of both blocks, m; or empty
-    ClothPairs pairs = {}, pruned = {};
-    bool is_pruned = false;
-
-    const ClothPairs& near() const { return is_pruned ? pruned : pairs; }
+    double left = -1, near_left = -1;  // of the reach of all, and of what is near, m
+    double came = 0;                   // in the window, m
+    bool has_some = false, is_near = false;
   };
+  struct List {
+    double reach = 0;        // when it was made, m
+    Matrix3Xd made_at = {};  // of the particles of both blocks, m; or empty
+    Candidates all = {}, near = {};
+  };
+  using Motion = std::vector<NearBlocks::Box>;  // of each block, m
 
+  void look(const Matrix3Xd& x, const NearBlocks::Box& all_in_window);
   void meet(double reach);
-  double motion(const BlockPair& blocks) const;
+  double length(const NearBlocks::Box& motion) const;
+  double between(const Motion& motion, const BlockPair& blocks) const;
   void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
-  double change(const Matrix3Xd& x, const List& list);
-  void renew(const Matrix3Xd& x, double least, double reach, List& list);
-  void prune(const Matrix3Xd& x, double reach, List& list);
+  double change(const Matrix3Xd& x, const BlockPair& blocks, const List& list);
+  void renew(const Matrix3Xd& x, double least, double reach, State& state, List& list);
+  static void prune(const Matrix3Xd& x, double reach, State& state, List& list);
 
   const Cloth& cloth_;
   NearBlocks blocks_;
-  Matrix3Xd before_;                     // positions at the last update, m; or empty
-  double met_left_ = -1;                 // of the reach that blocks were met with, m
-  double lasts_ = -1;                    // m
-  std::vector<List> lists_;              // in ascending order of blocks
-  std::vector<NearBlocks::Box> motion_;  // of each block since then, m
+  Matrix3Xd before_;           // where the window of the last update began, m; or empty
+  double met_left_ = -1;       // of the reach that blocks were met with, m
+  double lasts_ = -1;          // m
+  std::vector<State> states_;  // in ascending order of blocks
+  std::vector<List> lists_;    // of these
+  std::size_t near_ = 0;       // lists that have some
+  Motion since_, in_window_;
   Matrix3Xd now_;
 };
 

@@ -1,9 +1,9 @@
 #include "core/cloth_contact/pairs.h"
 
 #include <algorithm>
-#include <map>
 #include <utility>
 
+#include "core/cloth_contact/pair_batch.h"
 #include "core/contact/nearest.h"
 
 namespace weft {
@@ -33,6 +33,35 @@ bool has(const std::array<int, 3>& triangle, int particle) {
   return triangle[0] == particle || triangle[1] == particle || triangle[2] == particle;
 }
 
+std::array<int, 4> particles_of_corner(const Cloth& cloth, const ClothPair& pair) {
+  const auto& [a, b, c] = corners_of(cloth, pair.second);
+  return {pair.first, a, b, c};
+}
+std::array<int, 4> particles_of_edges(const Cloth& cloth, const ClothPair& pair) {
+  const auto& [a, b] = ends_of(cloth, pair.first);
+  const auto& [c, d] = ends_of(cloth, pair.second);
+  return {a, b, c, d};
+}
+
+// Calls f(pair, its squared distance at x, m^2) for all pairs of a kind.
+template <class Pair, class Particles, class F>
+void for_each_distance(bool edges, const std::vector<Pair>& pairs, const Particles& particles,
+                       const Matrix3Xd& x, const F& f) {
+  PairBatch batch;
+  for (std::size_t begin = 0; begin < pairs.size(); begin += batch.size()) {
+    batch.clear();
+    for (std::size_t n = begin; n < pairs.size() && !batch.full(); ++n) {
+      const auto [i, j, k, l] = particles(pairs[n]);
+      batch.add(x.col(i), x.col(j), x.col(k), x.col(l));
+    }
+    if (edges)
+      batch.solve_edges();
+    else
+      batch.solve_corners();
+    for (std::size_t n = 0; n < batch.size(); ++n) f(pairs[begin + n], batch.squared(n));
+  }
+}
+
 // Whether they come within `reach` of each other along every axis.
 bool boxes_meet(const Vector3d& low, const Vector3d& high, const Vector3d& other_low,
                 const Vector3d& other_high, double reach) {
@@ -43,6 +72,33 @@ bool boxes_meet(const Vector3d& low, const Vector3d& high, const Vector3d& other
 }
 
 }  // namespace
+
+Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs) {
+  Candidates made;
+  made.corners.reserve(pairs.corners.size());
+  made.edges.reserve(pairs.edges.size());
+  for (const ClothPair& pair : pairs.corners)
+    made.corners.push_back(
+        {particles_of_corner(cloth, pair), thickness_of_corner(cloth, pair.first, pair.second)});
+  for (const ClothPair& pair : pairs.edges)
+    made.edges.push_back(
+        {particles_of_edges(cloth, pair), thickness_of_edges(cloth, pair.first, pair.second)});
+  return made;
+}
+
+Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach) {
+  Candidates near;
+  const auto particles = [](const Candidate& candidate) { return candidate.particle; };
+  for (const bool edges : {false, true}) {
+    std::vector<Candidate>& to = edges ? near.edges : near.corners;
+    for_each_distance(edges, edges ? candidates.edges : candidates.corners, particles, x,
+                      [&](const Candidate& candidate, double squared) {
+                        const double within = candidate.thickness + reach;
+                        if (squared < within * within) to.push_back(candidate);
+                      });
+  }
+  return near;
+}
 
 double thickness_of_corner(const Cloth& cloth, int particle, int triangle) {
   const auto& [a, b, c] = corners_of(cloth, triangle);
@@ -77,7 +133,7 @@ bool near_edges(const Cloth& cloth, const Matrix3Xd& x, int one, int other, doub
   return (a + s * (b - a) - c - t * (d - c)).squaredNorm() < within * within;
 }
 
-std::vector<ClothPairs> all_pairs(const Cloth& cloth) {
+std::map<BlockPair, ClothPairs> all_pairs(const Cloth& cloth) {
   std::vector<int> particle_block(static_cast<std::size_t>(cloth.particles())), edge_block;
   const int blocks = static_cast<int>(cloth.first_block.size()) - 1;
   for (int b = 0; b < blocks; ++b) {
@@ -102,34 +158,44 @@ std::vector<ClothPairs> all_pairs(const Cloth& cloth) {
       if (!share_end(ends_of(cloth, e), ends_of(cloth, f)))
         list(edge_block[static_cast<std::size_t>(e)], edge_block[static_cast<std::size_t>(f)])
             .edges.push_back({e, f});
-  std::vector<ClothPairs> all;
-  for (auto& [blocks_of_list, pairs] : lists) all.push_back(std::move(pairs));
-  return all;
+  return lists;
 }
 
 ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
                       const Matrix3Xd& x, double reach) {
-  ClothPairs found;
+  ClothPairs some, found;
   const auto corners = [&](int from, int triangle) {
     const auto f = static_cast<std::size_t>(from);
     for (int k = cloth.first_corner[f]; k < cloth.first_corner[f + 1]; ++k) {
       const int i = cloth.corners[static_cast<std::size_t>(k)];
-      if (!has(corners_of(cloth, triangle), i) && near_corner(cloth, x, i, triangle, reach))
-        found.corners.push_back({i, triangle});
+      if (!has(corners_of(cloth, triangle), i)) some.corners.push_back({i, triangle});
     }
   };
   const auto edges = [&](int one, int other) {
     const auto s = static_cast<std::size_t>(one), t = static_cast<std::size_t>(other);
     for (int e = cloth.first_edge[s]; e < cloth.first_edge[s + 1]; ++e)
       for (int f = cloth.first_edge[t]; f < cloth.first_edge[t + 1]; ++f)
-        if (!share_end(ends_of(cloth, e), ends_of(cloth, f)) && near_edges(cloth, x, e, f, reach))
-          found.edges.push_back({std::min(e, f), std::max(e, f)});
+        if (!share_end(ends_of(cloth, e), ends_of(cloth, f)))
+          some.edges.push_back({std::min(e, f), std::max(e, f)});
   };
   near.for_each_near(blocks, cloth.thickest + reach, [&](int one, int other) {
     corners(one, other);
     corners(other, one);
     edges(one, other);
   });
+  for_each_distance(
+      false, some.corners, [&](const ClothPair& pair) { return particles_of_corner(cloth, pair); },
+      x,
+      [&](const ClothPair& pair, double squared) {
+        const double within = thickness_of_corner(cloth, pair.first, pair.second) + reach;
+        if (within > 0 && squared < within * within) found.corners.push_back(pair);
+      });
+  for_each_distance(
+      true, some.edges, [&](const ClothPair& pair) { return particles_of_edges(cloth, pair); }, x,
+      [&](const ClothPair& pair, double squared) {
+        const double within = thickness_of_edges(cloth, pair.first, pair.second) + reach;
+        if (within > 0 && squared < within * within) found.edges.push_back(pair);
+      });
   std::sort(found.corners.begin(), found.corners.end());
   std::sort(found.edges.begin(), found.edges.end());
   return found;

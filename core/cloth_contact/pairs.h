@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <compare>
+#include <map>
 #include <vector>
 
 #include "core/cloth_contact/near_blocks.h"
@@ -22,6 +24,21 @@ struct ClothPairs {
   bool operator==(const ClothPairs&) const = default;
 };
 
+// A pair by its particles: one and the corners of a triangle, or the ends of two edges.
+struct Candidate {
+  std::array<int, 4> particle;
+  double thickness;  // at which it is kept apart, m
+};
+struct Candidates {
+  std::vector<Candidate> corners, edges;
+
+  bool empty() const { return corners.empty() && edges.empty(); }
+};
+
+Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs);
+// Those that are nearer to each other at x, (3 x particles) m, than their thickness and `reach`, m.
+Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach);
+
 // The distance at which cloth keeps these apart, m.
 double thickness_of_corner(const Cloth& cloth, int particle, int triangle);
 double thickness_of_edges(const Cloth& cloth, int one, int other);
@@ -31,8 +48,8 @@ double thickness_of_edges(const Cloth& cloth, int one, int other);
 bool near_corner(const Cloth& cloth, const Matrix3Xd& x, int particle, int triangle, double reach);
 bool near_edges(const Cloth& cloth, const Matrix3Xd& x, int one, int other, double reach);
 
-// All pairs there are, one list for each two blocks.
-std::vector<ClothPairs> all_pairs(const Cloth& cloth);
+// All pairs there are, one list for each two blocks, in their order.
+std::map<BlockPair, ClothPairs> all_pairs(const Cloth& cloth);
 
 // Those between two blocks, at x where `near` has its boxes, that are nearer to each other than
 // their thickness and `reach`, m.

@@ -1,6 +1,9 @@
 #include "core/cloth_contact/separation.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -9,101 +12,175 @@
 namespace weft {
 namespace {
 
-constexpr int kMostPasses = 100;
-constexpr double kSmall = 2e-5;      // of thickness: what others need not answer
+constexpr int kMostPasses = 12;
+// of thickness: what others need not answer; the next window begins with what was given in this one
+constexpr double kSmall = 1e-4;
 constexpr double kDepthShare = 0.2;  // of its depth that a pair is moved apart
 
-// What takes `push` (m, along the normal) from a motion, and by friction from its sliding.
-Eigen::Vector4d against(const Eigen::Vector4d& motion, const Eigen::Vector4d& normal, double along,
-                        double push, double friction) {
-  const Eigen::Vector4d sliding = motion - along * normal;
-  const double length = sliding.norm();
-  Eigen::Vector4d change = push * normal;
-  if (length > 0) change -= std::min(1.0, friction * push / length) * sliding;
-  return change;
+std::size_t hash(const std::array<int, 4>& particle) {
+  std::uint64_t sum = 0;
+  for (const int i : particle) sum = (sum ^ static_cast<std::uint64_t>(i)) * 0x9e3779b97f4a7c15;
+  return static_cast<std::size_t>(sum >> 32);
 }
 
 }  // namespace
 
-void Separation::touch(std::span<const ContactCandidate> candidates, const Matrix3Xd& x,
-                       std::span<const double> inverse_mass, std::span<const Mover> movers,
-                       double most) {
+void Separation::touch(std::span<const NearCloth> near, const Untangling& untangling,
+                       const Matrix3Xd& x, std::span<const double> inverse_mass,
+                       std::span<const Mover> movers, double most) {
   contacts_.clear();
-  come_.clear();
-  for (const Mover& mover : movers) come_.push_back(mover.way.norm());
-  const auto come = [&](int i) { return come_[static_cast<std::size_t>(i)]; };
-  least_distance_ = std::numeric_limits<double>::infinity();
-  const auto margin_of = [&](const ContactCandidate& candidate) {
-    const auto& [i, j, k, l] = candidate.place;
-    const double margin = candidate.edges ? std::max(come(i), come(j)) + std::max(come(k), come(l))
-                                          : come(i) + std::max({come(j), come(k), come(l)});
-    return std::min(margin, most);
+  most_steps_ = std::numeric_limits<double>::infinity();
+  const Surroundings around{untangling, x, inverse_mass, movers, most};
+  for (const bool edges : {false, true}) touch(edges, near, around);
+}
+
+void Separation::touch(bool edges, std::span<const NearCloth> near, const Surroundings& around) {
+  struct Waiting {
+    const Candidate* candidate;
+    double within, friction;
   };
-  // of a run of candidates of a kind
   PairBatch batch;
-  for (std::size_t begin = 0; begin < candidates.size(); begin += batch.size()) {
-    const bool edges = candidates[begin].edges;
-    batch.clear();
-    for (std::size_t n = begin;
-         n < candidates.size() && candidates[n].edges == edges && !batch.full(); ++n) {
-      const auto& [i, j, k, l] = candidates[n].place;
-      batch.add(x.col(i), x.col(j), x.col(k), x.col(l));
-    }
+  std::array<Waiting, PairBatch::kMost> waiting;
+  const auto solve = [&] {
     if (edges)
       batch.solve_edges();
     else
       batch.solve_corners();
     for (std::size_t n = 0; n < batch.size(); ++n) {
-      const ContactCandidate& candidate = candidates[begin + n];
-      const double within = candidate.thickness + margin_of(candidate), squared = batch.squared(n);
+      const double squared = batch.squared(n);
+      const auto& [candidate, within, friction] = waiting[n];
       if (squared < within * within && squared > 0)
-        add(candidate, batch.weights(n), batch.apart(n), std::sqrt(squared), inverse_mass);
+        add(edges, *candidate, batch.weights(n), batch.apart(n), std::sqrt(squared), friction,
+            around);
+    }
+    batch.clear();
+  };
+  const auto of_kind = [&](std::size_t n) { return edges ? near[n].edges : near[n].corners; };
+  for (std::size_t n = 0; n < near.size(); ++n) {
+    // lists lie anywhere in memory
+    constexpr std::size_t kAhead = 4, kInLine = 2;
+    if (n + kAhead < near.size()) {
+      const std::span<const Candidate> ahead = of_kind(n + kAhead);
+      for (std::size_t k = 0; k < ahead.size(); k += kInLine) hwy::Prefetch(&ahead[k]);
+    }
+    const NearCloth& cloth = near[n];
+    for (const Candidate& candidate : of_kind(n)) {
+      const auto& [i, j, k, l] = candidate.particle;
+      waiting[batch.size()] = {&candidate, candidate.thickness + cloth.come, cloth.friction};
+      batch.add(around.x.col(i), around.x.col(j), around.x.col(k), around.x.col(l));
+      if (batch.full()) solve();
     }
   }
+  solve();
 }
 
-void Separation::add(const ContactCandidate& candidate, const std::array<double, 4>& weight,
-                     const Vector3d& apart, double distance, std::span<const double> inverse_mass) {
-  Contact contact{candidate.place,         weight,   {},
-                  Eigen::Vector4d::Zero(), distance, candidate.thickness,
-                  candidate.friction,      -1};
-  contact.normal.head<3>() = apart / distance;
+// That may have come nearer than its thickness, as far as its particles moved in relation to each
+// other.
+void Separation::add(bool edges, const Candidate& candidate, const std::array<double, 4>& weight,
+                     const Vector3d& apart, double distance, double friction,
+                     const Surroundings& around) {
+  constexpr double kLeastReach = 0.02;  // of the thickness, where things nearly touch
+  const auto mover = [&](std::size_t n) -> const Mover& {
+    return around.movers[static_cast<std::size_t>(candidate.particle[n])];
+  };
+  // of all of the one to all of the other, m^2
+  const auto farthest = [&](Eigen::Vector4d Mover::*motion) {
+    double most = 0;
+    const std::size_t ends = edges ? 2 : 1;
+    for (std::size_t m = 0; m < ends; ++m)
+      for (std::size_t n = ends; n < 4; ++n)
+        most = std::max(most, (mover(m).*motion - mover(n).*motion).squaredNorm());
+    return most;
+  };
+  const double room = distance - candidate.thickness;
+  if (room >= around.most || (room > 0 && room * room >= farthest(&Mover::way))) return;
+  if (!around.untangling.empty() && around.untangling.has(candidate.particle)) return;
+
+  std::array<double, 4> share;
   double moves = 0;  // 1/kg, of what the pair moves
   for (std::size_t n = 0; n < 4; ++n) {
-    contact.share[n] = weight[n] * inverse_mass[static_cast<std::size_t>(candidate.place[n])];
-    moves += weight[n] * contact.share[n];
+    share[n] = weight[n] * around.inverse_mass[static_cast<std::size_t>(candidate.particle[n])];
+    moves += weight[n] * share[n];
   }
   if (moves == 0) return;
-  for (double& share : contact.share) share /= moves;
-  least_distance_ = std::min(least_distance_, distance);
-  contacts_.push_back(contact);
+  for (double& part : share) part /= moves;
+  const double reach =
+      std::max(std::min(distance / 2, candidate.thickness / 4), kLeastReach * candidate.thickness);
+  const double in_step = farthest(&Mover::in_step);
+  if (in_step * most_steps_ * most_steps_ > reach * reach) most_steps_ = reach / std::sqrt(in_step);
+
+  Contact& contact = contacts_.emplace_back();
+  contact.particle = candidate.particle;
+  contact.edges = edges;
+  contact.weight = weight;
+  contact.share = share;
+  contact.normal << apart / distance, 0;
+  contact.room = room;
+  contact.thickness = candidate.thickness;
+  contact.friction = friction;
 }
 
 // Those are looked at again whose particles others have moved.
 void Separation::separate(double steps, std::span<Mover> movers) {
+  // what was given the last time
+  std::size_t next = 0;  // most pairs come in the order in which they came then
+  for (Contact& contact : contacts_) {
+    const std::size_t found = find_given(contact, next);
+    if (found == given_.size()) continue;
+    next = found + 1;
+    const Eigen::Vector4d& normal = contact.normal;
+    const auto turned = [&](const Change& change) -> Change {
+      return {change.along, change.sliding - change.sliding.dot(normal) * normal};
+    };
+    contact.way = turned(given_[found].way);
+    contact.in_step = turned(given_[found].in_step);
+    const Eigen::Vector4d way = contact.way.along * normal + contact.way.sliding,
+                          in_step = contact.in_step.along * normal + contact.in_step.sliding;
+    for (std::size_t n = 0; n < 4; ++n) {
+      Mover& mover = movers[static_cast<std::size_t>(contact.particle[n])];
+      mover.way += contact.share[n] * way;
+      mover.in_step += contact.share[n] * in_step;
+    }
+  }
+
   changed_.assign(movers.size(), 0);
   int now = 0;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const int before = now;
     for (Contact& contact : contacts_) {
       int changed = 0;
-      for (const int i : contact.place)
+      for (const int i : contact.particle)
         changed = std::max(changed, changed_[static_cast<std::size_t>(i)]);
       if (changed <= contact.looked_at) continue;
       if (separate(steps, contact, movers) > kSmall * contact.thickness) {
         ++now;
-        for (const int i : contact.place) changed_[static_cast<std::size_t>(i)] = now;
+        for (const int i : contact.particle) changed_[static_cast<std::size_t>(i)] = now;
       }
       contact.looked_at = now;
     }
     if (now == before) break;
   }
+  keep_given();
+}
+
+// What a motion lacks to be at least `least` along the normal, and without sliding as far as
+// friction by what is given beyond `free` holds that; some of what was given may be taken back. m
+Eigen::Vector4d Separation::give(const Eigen::Vector4d& motion, const Eigen::Vector4d& normal,
+                                 double least, double friction, double free, Change& given) {
+  const double along = motion.dot(normal), before = given.along;
+  given.along = std::max(before + least - along, 0.0);
+  Eigen::Vector4d sliding = given.sliding - (motion - along * normal);
+  const double most = friction * std::max(given.along - free, 0.0), length = sliding.norm();
+  if (length > most) sliding *= most / length;
+  const Eigen::Vector4d by = (given.along - before) * normal + sliding - given.sliding;
+  given.sliding = sliding;
+  return by;
 }
 
 // Returns how far it was from what it is to be, m.
-double Separation::separate(double steps, const Contact& contact, std::span<Mover> movers) const {
+double Separation::separate(double steps, Contact& contact, std::span<Mover> movers) {
   const auto mover = [&](std::size_t n) -> Mover& {
-    return movers[static_cast<std::size_t>(contact.place[n])];
+    return movers[static_cast<std::size_t>(contact.particle[n])];
   };
   Eigen::Vector4d way = Eigen::Vector4d::Zero(), in_step = Eigen::Vector4d::Zero();
   for (std::size_t n = 0; n < 4; ++n) {
@@ -111,25 +188,58 @@ double Separation::separate(double steps, const Contact& contact, std::span<Move
     in_step += contact.weight[n] * mover(n).in_step;
   }
 
-  // no nearer than the thickness, or than where it set out, and from there on out
   const Eigen::Vector4d& normal = contact.normal;
-  const double depth = std::max(contact.thickness - contact.distance, 0.0),
-               room = std::max(contact.distance - contact.thickness, 0.0);
-  const double come = way.dot(normal), push = std::max(-come - room, 0.0);
-  const double missing = std::max(kDepthShare * depth - room - (come + push), 0.0);
+  const double missing = kDepthShare * std::max(-contact.room, 0.0),
+               least = missing - std::max(contact.room, 0.0);
+  // no nearer than the thickness, or than where it set out, and from there on out
+  const double come = way.dot(normal), speed = in_step.dot(normal);
+  const auto allowed = [&](double come_by) {
+    return -std::max(contact.room + come_by, 0.0) / steps;
+  };
+  const double pushed_before = contact.way.along, braked_before = contact.in_step.along;
+  if (come >= least && speed >= allowed(come) && pushed_before == 0 && braked_before == 0) return 0;
+  const Eigen::Vector4d by = give(way, normal, least, contact.friction, missing, contact.way);
+  const double pushed = contact.way.along - pushed_before;
   // nor in the steps to come
-  const double left = std::max(contact.distance + come + push + missing - contact.thickness, 0.0);
-  const double speed = in_step.dot(normal), brake = std::max(-speed - left / steps, 0.0);
-  if (push <= 0 && missing <= 0 && brake <= 0) return 0;
-
-  Eigen::Vector4d by = missing * normal, change = Eigen::Vector4d::Zero();
-  if (push > 0) by += against(way, normal, come, push, contact.friction);
-  if (brake > 0) change = against(in_step, normal, speed, brake, contact.friction);
+  const Eigen::Vector4d braked =
+      give(in_step, normal, allowed(come + pushed), contact.friction, 0, contact.in_step);
   for (std::size_t n = 0; n < 4; ++n) {
     mover(n).way += contact.share[n] * by;
-    mover(n).in_step += contact.share[n] * change;
+    mover(n).in_step += contact.share[n] * braked;
   }
-  return std::max(push + missing, brake * steps);
+  return std::max(std::abs(pushed), std::abs(contact.in_step.along - braked_before) * steps);
+}
+
+void Separation::forget_given() {
+  given_.clear();
+  place_.clear();
+}
+
+void Separation::keep_given() {
+  given_.clear();
+  for (const Contact& contact : contacts_)
+    if (contact.way.along > 0 || contact.in_step.along > 0)
+      given_.push_back({contact.particle, contact.edges, contact.way, contact.in_step});
+  place_.assign(std::bit_ceil(2 * given_.size() + 1), 0);
+  for (std::size_t k = 0; k < given_.size(); ++k) {
+    std::size_t at = hash(given_[k].particle);
+    while (place_[at & (place_.size() - 1)] != 0) ++at;
+    place_[at & (place_.size() - 1)] = static_cast<std::uint32_t>(k + 1);
+  }
+}
+
+// Its place in given_, or the size of that. First looks at `next`.
+std::size_t Separation::find_given(const Contact& contact, std::size_t next) const {
+  const auto is = [&](const Given& given) {
+    return given.particle == contact.particle && given.edges == contact.edges;
+  };
+  if (next < given_.size() && is(given_[next])) return next;
+  if (given_.empty()) return 0;
+  for (std::size_t at = hash(contact.particle);; ++at) {
+    const std::uint32_t k = place_[at & (place_.size() - 1)];
+    if (k == 0) return given_.size();
+    if (is(given_[k - 1])) return k - 1;
+  }
 }
 
 }  // namespace weft

@@ -1,25 +1,26 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
-#include "core/model/mesh.h"
+#include "core/cloth_contact/pairs.h"
+#include "core/cloth_contact/untangling.h"
 
 namespace weft {
-
-// A particle and a triangle, or two edges, that may come near each other; by places in a list of
-// particles.
-struct ContactCandidate {
-  std::array<int, 4> place;
-  bool edges;
-  double thickness, friction;  // m, 1
-};
 
 // A particle on its way. Fourth components are 0.
 struct Mover {
   Eigen::Vector4d way;      // that it has come since contact acted last, m
   Eigen::Vector4d in_step;  // displacement of the step to come, m
+};
+
+// Candidates that may come near each other.
+struct NearCloth {
+  std::span<const Candidate> corners, edges;
+  double friction;  // 1
+  double come;      // no farther in relation to each other, m
 };
 
 // Keeps pairs from passing through each other, and at their thickness.
@@ -28,38 +29,70 @@ struct Mover {
 // their own sides. Inelastic: it takes away the approach that has brought the pair nearer than its
 // thickness, or would in the steps to come, and friction by Coulomb as much of its sliding as that
 // allows. Pairs that are nearer all the same are moved apart without speed, some of the way each
-// time. What a pair gives to one it takes from the other. Pairs follow one another in their order.
+// time. What a pair gives to one it takes from the other. Pairs follow one another in their order,
+// again and again, and take back what others have made needless; they begin with what they gave
+// the last time, which in cloth that lies still is what they will give.
 class Separation {
  public:
   // Finds the candidates that may have come nearer than their thickness on their way, as far as
-  // they came less far than `most` (m). x: where movers set out, (3 x movers) m; 1/kg.
-  void touch(std::span<const ContactCandidate> candidates, const Matrix3Xd& x,
+  // they came less far than `most` (m) in relation to each other, without those that are led apart.
+  // x: where movers set out, (3 x movers) m; 1/kg.
+  void touch(std::span<const NearCloth> near, const Untangling& untangling, const Matrix3Xd& x,
              std::span<const double> inverse_mass, std::span<const Mover> movers, double most);
   bool empty() const { return contacts_.empty(); }
-  // Of those found, m.
-  double least_distance() const { return least_distance_; }
+  // In how many steps like the last none of those found comes nearer by more than half its
+  // distance, nor slides that far.
+  double most_steps() const { return most_steps_; }
   // Of as many steps as are to come until contact acts again.
   void separate(double steps, std::span<Mover> movers);
+  // Has pairs begin with nothing the next time.
+  void forget_given();
 
  private:
+  // Of a pair's motion: along its normal, at least 0; by friction.
+  struct Change {
+    double along = 0;
+    Eigen::Vector4d sliding = Eigen::Vector4d::Zero();
+  };
   // Weights lead from the second one's nearest point to the first one's; shares are what particles
   // have of the pair's motion.
   struct Contact {
-    std::array<int, 4> place;
-    std::array<double, 4> weight, share;
-    Eigen::Vector4d normal;
-    double distance, thickness, friction;  // m, m, 1
-    int looked_at;                         // when
+    std::array<int, 4> particle = {};
+    bool edges = false;
+    int looked_at = -1;  // when
+    std::array<double, 4> weight = {}, share = {};
+    Eigen::Vector4d normal = {};
+    double room = 0;                     // to its thickness, where it set out, m
+    double thickness = 0, friction = 0;  // m, 1
+    Change way = {}, in_step = {};       // that it has given, m
+  };
+  struct Given {
+    std::array<int, 4> particle;
+    bool edges;
+    Change way, in_step;
+  };
+  struct Surroundings {
+    const Untangling& untangling;
+    const Matrix3Xd& x;
+    std::span<const double> inverse_mass;
+    std::span<const Mover> movers;
+    double most;
   };
 
-  void add(const ContactCandidate& candidate, const std::array<double, 4>& weight,
-           const Vector3d& apart, double distance, std::span<const double> inverse_mass);
-  double separate(double steps, const Contact& contact, std::span<Mover> movers) const;
+  void touch(bool edges, std::span<const NearCloth> near, const Surroundings& around);
+  void add(bool edges, const Candidate& candidate, const std::array<double, 4>& weight,
+           const Vector3d& apart, double distance, double friction, const Surroundings& around);
+  static Eigen::Vector4d give(const Eigen::Vector4d& motion, const Eigen::Vector4d& normal,
+                              double least, double friction, double free, Change& given);
+  static double separate(double steps, Contact& contact, std::span<Mover> movers);
+  std::size_t find_given(const Contact& contact, std::size_t next) const;
+  void keep_given();
 
   std::vector<Contact> contacts_;
-  std::vector<double> come_;  // how far each mover came, m
-  std::vector<int> changed_;  // when, of each mover
-  double least_distance_ = 0;
+  std::vector<Given> given_;          // the last time, of pairs that gave something
+  std::vector<std::uint32_t> place_;  // in given_ and one more, by hash of the pair; 0: none
+  std::vector<int> changed_;          // when, of each mover
+  double most_steps_ = 0;
 };
 
 }  // namespace weft

@@ -45,7 +45,7 @@ TEST(NearBlocks, HaveEveryPairWithinReach) {
   for (const SheetDefinition& sheet : sheets) {
     const Cloth cloth({sheet});
     NearBlocks near(cloth);
-    const std::vector<ClothPairs> all = all_pairs(cloth);
+    const std::map<BlockPair, ClothPairs> all = all_pairs(cloth);
     const double thickest = sheet.thickness_or_default();
     std::size_t most = 0;
     for (const double turns : {0.01, 0.2, 0.5, 1.0, 3.0}) {
@@ -53,7 +53,7 @@ TEST(NearBlocks, HaveEveryPairWithinReach) {
         SCOPED_TRACE(::testing::Message() << turns << " turns, reach " << reach);
         const Matrix3Xd x = rolled(sheet, turns, 3e-4);
         std::vector<ClothPairs> expected;
-        for (const ClothPairs& list : all) {
+        for (const auto& [blocks, list] : all) {
           ClothPairs some;
           for (const auto& [i, t] : list.corners)
             if (near_corner(cloth, x, i, t, reach)) some.corners.push_back({i, t});

@@ -55,11 +55,15 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   constexpr int kParticles = 4096;  // whose substep takes longer than to ask
   const std::int64_t turn = std::max(1, kParticles / particle_count());
   const double begin = time(), dt = plan.step.substep;
+  constexpr std::int64_t kSettlings = 16;  // of a frame
+  const std::int64_t settling = std::max<std::int64_t>(1, plan.step.substeps / kSettlings);
+  const bool settles = is_relaxing() && relaxation->settling > 0;
   if (cloth_contact && unfinished->substeps == 0)
     cloth_contact->untangle(sheets, begin < end_of_untangling(scene));
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
     step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
     ++k;
+    if (settles && k % settling == 0) settle(begin + static_cast<double>(k) * dt);
     if (enough && k % turn == 0 && k < plan.step.substeps && enough()) return false;
   }
   return true;
@@ -111,7 +115,7 @@ bool Simulation::State::begin_frame(bool in_parts) {
   for (const MovingSheet& sheet : sheets) sheet.good();  // to go back to, and to show
   if (repairs.grow(frame + 1, plan.step)) begin_again();
   repairs.begin_frame();
-  unfinished = {0, begins_to_relax() ? coarser_simulation() : nullptr, std::move(before)};
+  unfinished = {0, begins_to_relax() ? coarser_simulation() : nullptr, std::move(before), 0};
   return true;
 }
 
@@ -140,6 +144,7 @@ Decision Simulation::State::repair(const Attempt& made, NextStates& next) {
   const Decision decision = repairs.judge(frame + 1, made, plan.step);
   if (decision == Decision::kAgain) {
     unfinished->substeps = 0;
+    unfinished->energy = 0;
     begin_again();
   } else if (decision == Decision::kConfirmed) {
     for (std::size_t s = 0; s < sheets.size(); ++s)

@@ -73,9 +73,24 @@ bool Simulation::State::relax_coarser(const Enough& enough, ThreadPool& pool) {
     sheets[s].set_good(begin[s]);
     sheets[s].budget = {};
   }
+  constexpr int kSettling = 2;
+  if (coarser) relaxation->settling = kSettling;
   unfinished->coarser.reset();
   relaxation->begun = true;
   return true;
+}
+
+// Amid a frame.
+void Simulation::State::settle(double time) {
+  NextStates now(sheets.size());
+  double energy = 0;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    sheets[s].read(now[s]);
+    energy += now[s].kinetic_energy;
+  }
+  const bool slows_down = energy < unfinished->energy;
+  if (slows_down) stand_still(time, now);
+  unfinished->energy = slows_down ? 0 : energy;
 }
 
 bool Simulation::State::is_relaxing() const {

@@ -30,9 +30,10 @@ struct SheetStates {
 
 // A frame that is being computed.
 struct UnfinishedFrame {
-  std::int64_t substeps = 0;                 // taken by this attempt
-  std::unique_ptr<Simulation> coarser = {};  // that comes to rest before
-  std::optional<Snapshot> before;            // where it can be dropped
+  std::int64_t substeps = 0;            // taken by this attempt
+  std::unique_ptr<Simulation> coarser;  // that comes to rest before
+  std::optional<Snapshot> before;       // where it can be dropped
+  double energy = 0;                    // when it last settled, J
 };
 
 struct Simulation::State {
@@ -89,6 +90,7 @@ struct Simulation::State {
   std::unique_ptr<Simulation> coarser_simulation() const;
   bool relax_coarser(const Enough& enough, ThreadPool& pool);
   void stand_still(double time, NextStates& next);
+  void settle(double time);
   bool is_relaxing() const;
   void set_damping(bool relaxes);
   void make_solvers();

@@ -3,6 +3,10 @@
 namespace weft {
 
 Relaxation::Next Relaxation::look(const MeanMotion& motion, bool quiet) {
+  if (settling > 0) {
+    --settling;
+    return Next::kStandStill;
+  }
   constexpr int kStalls = 16;
   constexpr double kSmaller = 0.9;
   if (standing) {

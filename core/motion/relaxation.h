@@ -27,6 +27,10 @@ struct Relaxation {
   double least = std::numeric_limits<double>::infinity();  // residual so far
   int stalls = 0;  // frames from standing without a smaller one
 
+  // Frames to come that stand still in parts: what the way from fewer particles has stretched would
+  // throw the cloth about.
+  int settling = 0;
+
   bool operator==(const Relaxation&) const = default;
 
   // What follows from a frame. quiet: whether it was, see is_quiet(); a scene that chatters rests

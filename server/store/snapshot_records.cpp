@@ -92,6 +92,7 @@ void set(stored::KeptRelaxation* to, const Relaxation& from) {
   if (from.residual) to->set_residual(*from.residual);
   to->set_least_residual(from.least);
   to->set_stalls(from.stalls);
+  to->set_settling(from.settling);
 }
 
 Relaxation relaxation_of(const stored::KeptRelaxation& from) {
@@ -101,7 +102,8 @@ Relaxation relaxation_of(const stored::KeptRelaxation& from) {
           .energy = from.energy_j(),
           .residual = from.has_residual() ? std::optional(from.residual()) : std::nullopt,
           .least = from.least_residual(),
-          .stalls = from.stalls()};
+          .stalls = from.stalls(),
+          .settling = from.settling()};
 }
 
 // Plans that a snapshot shares, each once.

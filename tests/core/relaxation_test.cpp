@@ -145,7 +145,7 @@ TEST(Relaxation, EndsWithTheNextActionAndTheSceneMovesOn) {
   Simulation simulation(scene);
   const double damping = simulation.plan().dampings[0].damping;
   ASSERT_FALSE(simulation.act({kRelax}));
-  move(simulation, 2);
+  move(simulation, 3);
   EXPECT_TRUE(simulation.residual());
   ASSERT_FALSE(simulation.act({{.kind = Action::Kind::kUnpin, .particle = 0}}));
   EXPECT_FALSE(simulation.residual());

@@ -12,21 +12,31 @@ namespace {
 constexpr double kSpacing = 0.01;  // of points that are looked at along an edge, at least, m
 constexpr double kOutward = 1;     // fastest that an edge is pushed out, m/s
 
-// Of an edge the point that is deepest within the skin, or closest to it.
-struct Deepest {
-  Distance distance{std::numeric_limits<double>::infinity(), Vector3d::Zero()};
-  double share = 0;  // of the way to the second end
+// Of an edge what lies within skins, by how deep it is there; else how close it comes.
+struct Depth {
+  double nearest = std::numeric_limits<double>::infinity();  // m, negative within
+  Vector3d out = Vector3d::Zero();                           // mean direction
+  double share = 0;                                          // of the way to the second end
 };
 
-Deepest deepest_between(const Contacts& contacts, const Vector3d& from, const Vector3d& to) {
-  const double length = (to - from).norm();
-  Deepest deepest;
-  for (double at = kSpacing; at < length - kSpacing;) {
-    const Distance there = contacts.nearest(from + at / length * (to - from));
-    if (there.value < deepest.distance.value) deepest = {there, at / length};
-    at += std::max(kSpacing, there.value);
+Depth depth_between(const Contacts& contacts, const Vector3d& from, const Vector3d& to) {
+  const int parts = static_cast<int>((to - from).norm() / kSpacing);
+  const double step = (to - from).norm() / parts;
+  Depth found;
+  double sum = 0;
+  for (int k = 1; k < parts;) {
+    const double share = static_cast<double>(k) / parts;
+    const Distance there = contacts.nearest(from + share * (to - from));
+    found.nearest = std::min(found.nearest, there.value);
+    k += there.value > step ? static_cast<int>(std::min<double>(parts, there.value / step)) : 1;
+    if (!(there.value < 0)) continue;
+    found.out -= there.value * there.normal;
+    found.share -= there.value * share;
+    sum -= there.value;
   }
-  return deepest;
+  if (sum > 0) found.share /= sum;
+  found.out.normalize();
+  return found;
 }
 
 }  // namespace
@@ -56,14 +66,19 @@ void OpenSeams::keep_out(const Contacts& contacts, double dt, MovingSheet& sheet
   sheet.solver->read(particles_, x_, d_);
   const Eigen::RowVectorXd come = (x_ - before_).colwise().norm();
   before_ = x_;
-  std::map<int, std::array<Vector3d, 2>> moved;  // by that, and in the step, m
+  // of an end: by how much, and in the step, by so many edges, m
+  struct Move {
+    Vector3d by = Vector3d::Zero(), in_step = Vector3d::Zero();
+    int edges = 0;
+  };
+  std::map<int, Move> moves;
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     const auto& ends = edges_[e];
     clear_[e] -= std::max(come[ends[0]], come[ends[1]]) + contacts.reach();
     if (clear_[e] > 0) continue;
-    const auto [distance, share] = deepest_between(contacts, x_.col(ends[0]), x_.col(ends[1]));
-    clear_[e] = std::isfinite(distance.value) ? distance.value / 2 - kSpacing : 0;
-    if (!(distance.value < 0)) continue;
+    const auto [nearest, normal, share] = depth_between(contacts, x_.col(ends[0]), x_.col(ends[1]));
+    clear_[e] = std::isfinite(nearest) ? nearest / 2 - kSpacing : 0;
+    if (!(nearest < 0) || normal.isZero(0)) continue;
     std::array<double, 2> part{1 - share, share};
     for (std::size_t k = 0; k < 2; ++k)
       if (sheet.dynamics.inverse_mass[particles_[static_cast<std::size_t>(ends[k])]] == 0)
@@ -73,26 +88,24 @@ void OpenSeams::keep_out(const Contacts& contacts, double dt, MovingSheet& sheet
 
     // out, and no farther in
     const Vector3d motion = (1 - share) * d_.col(ends[0]) + share * d_.col(ends[1]);
-    const Vector3d out = std::min(-distance.value, kOutward * dt) / sum * distance.normal;
-    const Vector3d stop = std::max(0.0, -motion.dot(distance.normal)) / sum * distance.normal;
+    const Vector3d out = std::min(-nearest, kOutward * dt) / sum * normal;
+    const Vector3d stop = std::max(0.0, -motion.dot(normal)) / sum * normal;
     for (std::size_t k = 0; k < 2; ++k) {
       if (part[k] == 0) continue;
-      x_.col(ends[k]) += part[k] * out;
-      d_.col(ends[k]) += part[k] * stop;
-      auto& [by, in_step] =
-          moved.try_emplace(ends[k], std::array<Vector3d, 2>{Vector3d::Zero(), Vector3d::Zero()})
-              .first->second;
-      by += part[k] * out;
-      in_step += part[k] * stop;
+      Move& move = moves[ends[k]];
+      move.by += part[k] * out;
+      move.in_step += part[k] * stop;
+      ++move.edges;
     }
   }
-  if (moved.empty()) return;
+  if (moves.empty()) return;
+  // the mean of what edges ask of an end: none goes before another, so that symmetry stays
   std::vector<int> particles;
-  Matrix3Xd by(3, static_cast<Eigen::Index>(moved.size())), in_step = by;
-  for (const auto& [end, moves] : moved) {
+  Matrix3Xd by(3, static_cast<Eigen::Index>(moves.size())), in_step = by;
+  for (const auto& [end, move] : moves) {
     const auto k = static_cast<Eigen::Index>(particles.size());
-    by.col(k) = moves[0];
-    in_step.col(k) = moves[1];
+    by.col(k) = move.by / move.edges;
+    in_step.col(k) = move.in_step / move.edges;
     particles.push_back(particles_[static_cast<std::size_t>(end)]);
   }
   sheet.solver->displace(particles, by, in_step);

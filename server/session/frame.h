@@ -48,9 +48,9 @@ struct Frame {
   std::optional<std::int64_t> cloth_cuts;  // of scenes with cloth contact
   bool at_rest = false;
   std::optional<double> residual;  // of scenes that relax, of their weight
-  std::int64_t substeps = 0;    // since the frame before
-  double substep = 0;           // s
-  std::vector<Repair> repairs;  // that it took
+  std::int64_t substeps = 0;       // since the frame before
+  double substep = 0;              // s
+  std::vector<Repair> repairs;     // that it took
   // What the values below are read with: the scene as it was, and what reads them. Where there is
   // none they were recorded, or not.
   std::shared_ptr<const Scene> scene;

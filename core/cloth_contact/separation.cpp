@@ -172,7 +172,7 @@ Eigen::Vector4d Separation::give(const Eigen::Vector4d& motion, const Eigen::Vec
   Eigen::Vector4d sliding = given.sliding - (motion - along * normal);
   const double most = friction * std::max(given.along - free, 0.0), length = sliding.norm();
   if (length > most) sliding *= most / length;
-  const Eigen::Vector4d by = (given.along - before) * normal + sliding - given.sliding;
+  Eigen::Vector4d by = (given.along - before) * normal + sliding - given.sliding;
   given.sliding = sliding;
   return by;
 }

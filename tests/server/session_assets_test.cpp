@@ -101,6 +101,7 @@ TEST_F(SessionAssets, HoldTheMeshesOfBodiesAsThoseOfSheets) {
   cube.mutable_poses()->set_positions_m(cube.positions_m() + risen);
   const std::string name = name_of_asset(cube.SerializeAsString());
   *scene.add_colliders()->mutable_mesh()->mutable_data() = cube;
+  scene.mutable_colliders(0)->mutable_mesh()->set_cell_m(0.02);  // made anew as it moves
   v1::Session session = service_->create(scene);
   EXPECT_EQ(session.scene().colliders(0).mesh().asset(), name);
   service_->step(session, 20);

@@ -8,11 +8,6 @@
 #include "core/simulation_state.h"
 
 namespace weft {
-namespace {
-
-std::vector<Action> relaxing() { return {{.kind = Action::Kind::kRelax}}; }
-
-}  // namespace
 
 // Once nothing moves the scene but its forces.
 bool Simulation::State::begins_to_relax() const {
@@ -29,7 +24,7 @@ std::unique_ptr<Simulation> Simulation::State::coarser_simulation() const {
   auto coarser = coarser_scene(scene, x, time());
   if (!coarser || !find_problems(*coarser).empty()) return nullptr;
   auto made = std::make_unique<Simulation>(std::move(*coarser), make_solver);
-  if (made->refusal() || made->act(relaxing())) return nullptr;
+  if (made->refusal() || made->act({{.kind = Action::Kind::kRelax}})) return nullptr;
   return made;
 }
 

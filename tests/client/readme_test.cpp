@@ -21,6 +21,10 @@ TEST(Readme, ShowsWhatItsCommandsAnswer) {
   answer({"scene", "new", "--template", "sphere", "--textile", "wool_tropical", "-o", scene});
   const std::string recorded = answer({"record", scene, "--until-rest", "-o", file});
   EXPECT_THAT(readme, HasSubstr(recorded.substr(recorded.find(": "))));
+  const std::string hang = directory.path("hang.json");
+  answer({"scene", "new", "-t", "hang", "--textile", "denim_11oz", "-o", hang});
+  EXPECT_THAT(readme,
+              HasSubstr("    " + answer({"run", hang, "--embedded", "--until-rest", "--relax"})));
 
   // what it says of the scene and of the recording, but for names, times and sizes
   std::istringstream lines(answer({"scene", "check", scene}) + answer({"info", file}));

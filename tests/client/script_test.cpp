@@ -105,6 +105,25 @@ steps:
       AllOf(HasSubstr("column is missing"), HasSubstr("drag.to_m")));
 }
 
+// Only what has relaxed stands still to the last bit.
+TEST_F(ScriptTest, RelaxesAsTheCommandsDo) {
+  const auto result = ask({"script", script(R"(
+steps:
+  - create: {scene: scene.json}
+  - relax: {}
+  - run: {until_rest: true}
+  - expect: {at_rest: true, kinetic_energy_j: {max: 0}}
+)")});
+  EXPECT_EQ(result["failed"], 0);
+  ask({"session", "create", path("scene.json"), "--id", "hand"});
+  const std::vector<std::string> record = {"record",  "hand", "--until-rest",
+                                           "--relax", "-o",   path("hand.weft")};
+  EXPECT_THAT(weft(record).err, HasSubstr("--relax is for a session that runs; give --run"));
+  std::vector<std::string> runs = record;
+  runs.push_back("--run");
+  EXPECT_LE(ask(runs)["residual"], 1e-3);
+}
+
 TEST_F(ScriptTest, ParticlesOfTrianglesGoByTheirNumber) {
   scene_file(scene_of(square_mesh(4)));
   EXPECT_EQ(ask({"script", script(R"(

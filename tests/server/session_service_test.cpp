@@ -121,16 +121,20 @@ TEST(Sessions, RunUntilAFrameAtTheirPaceAndPauseThere) {
   EXPECT_EQ(service.get(session).state(), v1::SESSION_STATE_PAUSED);
 }
 
+void run_until_rest(Service& service, const v1::Session& session) {
+  v1::RunSessionRequest request;
+  request.set_name(session.name());
+  request.set_until_rest(true);
+  ASSERT_EQ(service.error(&Sessions::RunSession, request).code, grpc::StatusCode::OK);
+}
+
 TEST(Sessions, RunUntilRest) {
   Service service;
   const v1::Session session = service.create();
   auto frames = frames_of(session);
   frames.mutable_format()->set_stats(true);
   Stream stream(service, frames);
-  v1::RunSessionRequest request;
-  request.set_name(session.name());
-  request.set_until_rest(true);
-  ASSERT_EQ(service.error(&Sessions::RunSession, request).code, grpc::StatusCode::OK);
+  run_until_rest(service, session);
   while (!stream.frame().stats().at_rest()) {
   }
   const v1::Session rested = service.get(session);
@@ -150,10 +154,7 @@ TEST(Sessions, RelaxToRestAndSayWhatForcesAreLeft) {
   relax.add_actions()->mutable_relax();
   ASSERT_EQ(service.error(&Sessions::ApplyActions, relax).code, grpc::StatusCode::OK);
   EXPECT_FALSE(service.get(session).has_residual());
-  v1::RunSessionRequest request;
-  request.set_name(session.name());
-  request.set_until_rest(true);
-  ASSERT_EQ(service.error(&Sessions::RunSession, request).code, grpc::StatusCode::OK);
+  run_until_rest(service, session);
   v1::FrameStats stats;
   while (!stats.at_rest()) {
     stats = stream.frame().stats();

@@ -61,7 +61,25 @@ double share_of(const SolverSettings& solver, const StableStep& stable) {
   return std::min(solver.safety, safe_share(stable.connection_ratio));
 }
 
-StepPlan plan_step(const Scene& scene, const std::vector<StableStep>& sheets) {
+// By how much the step may be longer than one for every shape.
+double gain_of(const Scene& scene, const std::vector<PlannedSheet>& planned,
+               const std::vector<StableStep>& steps) {
+  const SolverSettings& solver = scene.solver;
+  if (solver.step_bound != StepBound::kUnsheared || solver.integrator != IntegratorKind::kVerlet)
+    return 1;
+  double gain = std::numeric_limits<double>::infinity();
+  for (std::size_t s = 0; s < planned.size(); ++s) {
+    const auto& [mesh, inverse_mass, x, tethers] = planned[s];
+    const double share = unsheared_share(mesh, steps[s].connection_ratio);
+    if (share == 0) return 1;
+    const double most = unsheared_gain_of(scene.sheets[s], mesh, inverse_mass,
+                                          air_rate(scene, scene.sheets[s], mesh));
+    gain = std::min(gain, 1 + share * (most - 1));
+  }
+  return gain;
+}
+
+StepPlan plan_step(const Scene& scene, const std::vector<StableStep>& sheets, double gain) {
   const SolverSettings& solver = scene.solver;
   StepPlan step;
   step.linear_bound = step.estimated_bound = std::numeric_limits<double>::infinity();
@@ -76,9 +94,11 @@ StepPlan plan_step(const Scene& scene, const std::vector<StableStep>& sheets) {
     step.limiting_sheet = scene.sheets[s].name;
   }
 
+  if (solver.step_bound == StepBound::kUnsheared) step.unsheared_bound = gain * step.linear_bound;
+
   // an asked step that divides the frame step up to rounding is taken as it is
   constexpr double kRounding = 1e-9;
-  const double longest = solver.substep.value_or(safe);
+  const double longest = solver.substep.value_or(gain * safe);
   const double count = std::ceil(solver.frame_step / longest * (1 - kRounding));
   step.substeps = static_cast<std::int64_t>(std::clamp(count, 1.0, 1e18));
   step.substep = solver.frame_step / static_cast<double>(step.substeps);
@@ -366,11 +386,11 @@ void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
     warn_of_damping(scene, planned, s, steps[s], plan);
     describe_stretch(scene, s, plan);
   }
-  if (plan.step.substep > plan.step.linear_bound)
+  if (plan.step.substep > plan.step.longest())
     plan.warnings.push_back(
         {"STEP_UNSTABLE", "solver.substep_s",
          join("the substep of ", plan.step.substep, " s lies above the linear bound of ",
-              plan.step.linear_bound, " s: the run may diverge")});
+              plan.step.longest(), " s: the run may diverge")});
 }
 
 }  // namespace
@@ -403,15 +423,15 @@ std::span<const std::string_view> warning_codes() {
 
 std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver,
                                         std::int64_t most_substeps) {
-  const bool unstable = step.substep > step.linear_bound && !solver.allow_unstable;
+  const bool unstable = step.substep > step.longest() && !solver.allow_unstable;
   if (!unstable && step.substeps <= most_substeps) return std::nullopt;
-  return StepRefusal{step.substep, step.linear_bound, !unstable, step.substeps, most_substeps};
+  return StepRefusal{step.substep, step.longest(), !unstable, step.substeps, most_substeps};
 }
 
 Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
   Plan plan;
   const std::vector<StableStep> steps = stable_steps(scene, sheets);
-  plan.step = plan_step(scene, steps);
+  plan.step = plan_step(scene, steps, gain_of(scene, sheets, steps));
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     plan.dampings.push_back(
         {scene.sheets[s].name, sheets[s].mesh.damping, steps[s].connection_ratio});

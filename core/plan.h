@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -20,6 +21,10 @@ struct StepPlan {
   double estimated_bound = 0;  // for the present shape
   double damping_ratio = 0;    // of the stiffest mode
   std::string limiting_sheet;
+  double unsheared_bound = 0;  // for shapes that shear little; 0: not asked for
+
+  // The longest that is not refused, s.
+  double longest() const { return std::max(linear_bound, unsheared_bound); }
 };
 
 struct SkippedPass {

@@ -32,7 +32,7 @@ bool Repairs::grow(std::int64_t frame, StepPlan& step) {
     times += repair.frame == last ? 0 : 1;
     last = repair.frame;
   }
-  if (halvings_ <= lasting || 2 * step.substep > step.linear_bound) return false;
+  if (halvings_ <= lasting || 2 * step.substep > step.longest()) return false;
   const std::int64_t good = frame - 1 - last;
   if (good == 0 || good % (kGood << std::clamp(times - 1, 0, kMostDoublings)) != 0) return false;
   set(halvings_ - 1, halvings_, step);

@@ -30,16 +30,35 @@ std::vector<bool> triangles_at_open_seams(const SheetDefinition& sheet) {
 StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,
                           const VectorXd& inverse_mass, IntegratorKind integrator, double air_rate,
                           const Matrix3Xd& x) {
-  if (!is_large(sheet.shape)) return stable_step(mesh, inverse_mass, integrator, air_rate, x);
+  if (!is_sampled(sheet.shape)) return stable_step(mesh, inverse_mass, integrator, air_rate, x);
   const auto step_of = [&](int particle) {
     const LatticeSample sample = sample_of(grid_of(sheet), mesh, particle);
     return stable_step(sample.mesh, sample.mesh.mass.cwiseInverse(), integrator, air_rate,
                        x(Eigen::all, sample.particles));
   };
   StableStep step = step_of(0);
+  if (!is_large(sheet.shape)) {
+    const double estimate = step.estimate;
+    step = stable_step(mesh, inverse_mass, integrator, air_rate, {});
+    step.estimate = estimate;
+  }
   if (const int tautest = tautest_particle(mesh, x); tautest > 0)
     step.estimate = std::min(step.estimate, step_of(tautest).estimate);
   return step;
+}
+
+double unsheared_gain_of(const SheetDefinition& sheet, const Mesh& mesh,
+                         const VectorXd& inverse_mass, double air_rate) {
+  const auto* grid = std::get_if<Grid>(&sheet.shape);
+  if (grid == nullptr && std::holds_alternative<ChoiKo>(sheet.bending)) return 1;
+  if (grid == nullptr) return unsheared_gain(mesh, inverse_mass, air_rate, {});
+  SheetDefinition level;
+  level.shape = *grid;
+  const Matrix3Xd flat = start_positions(level);
+  if (!is_large(sheet.shape)) return unsheared_gain(mesh, inverse_mass, air_rate, flat);
+  const LatticeSample sample = sample_of(*grid, mesh);
+  return unsheared_gain(sample.mesh, sample.mesh.mass.cwiseInverse(), air_rate,
+                        flat(Eigen::all, sample.particles));
 }
 
 double damping_of(const SheetDefinition& sheet, const Mesh& mesh, double ratio) {

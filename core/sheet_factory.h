@@ -20,10 +20,13 @@ void ease_rest_shape(const SheetDefinition& sheet, double share, Mesh& mesh);
 // Which of its triangles start along seams that are to close; empty: none.
 std::vector<bool> triangles_at_open_seams(const SheetDefinition& sheet);
 
-// As stable_step() and damping_for(); of a large lattice by samples of it.
+// As stable_step(), unsheared_gain() and damping_for(); of large lattices by samples of them.
 StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,
                           const VectorXd& inverse_mass, IntegratorKind integrator, double air_rate,
                           const Matrix3Xd& x);
+// 1 where that is not known.
+double unsheared_gain_of(const SheetDefinition& sheet, const Mesh& mesh,
+                         const VectorXd& inverse_mass, double air_rate);
 double damping_of(const SheetDefinition& sheet, const Mesh& mesh, double ratio);
 
 // What keeps a sheet's free particles within the reach of held ones, if it asks for that.

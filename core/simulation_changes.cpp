@@ -140,11 +140,14 @@ void Simulation::State::shorten_step() {
     StepPlan& step = plan.step;
     const double bound = linear_bound(sheet.mesh, sheet.dynamics.inverse_mass,
                                       scene.solver.integrator, 0, sheet.good().x);
-    const double longest = scene.solver.safety * bound;
+    const double gain = step.longest() / step.linear_bound;
+    const double longest = scene.solver.safety * gain * bound;
     if (step.substep <= longest) continue;
     step.substeps = static_cast<std::int64_t>(std::ceil(scene.solver.frame_step / longest));
     step.substep = scene.solver.frame_step / static_cast<double>(step.substeps);
-    step.linear_bound = std::min(step.linear_bound, bound);
+    if (step.linear_bound <= bound) continue;
+    step.linear_bound = bound;
+    if (step.unsheared_bound > 0) step.unsheared_bound = gain * bound;
   }
 }
 

@@ -193,6 +193,11 @@ std::string plan_text(const v1::Plan& plan, const v1::ServerStats* stats) {
   } else {
     facts.add("linear bound", "none for this integrator");
   }
+  if (plan.unsheared_bound_s() > 0) {
+    facts.add("unsheared bound",
+              seconds_text(plan.unsheared_bound_s()) +
+                  ", for shapes in which threads cross nearly as in the flat sheet");
+  }
   facts.add("close estimate", seconds_text(plan.estimated_bound_s()) + ", for the present shape");
   for (const auto& damping : plan.dampings()) {
     facts.add("damping", fmt::format("{}: {} kg/s, {} of critical in its stiffest mode",

@@ -7,13 +7,15 @@ namespace {
 
 constexpr int kSide = 96;  // of a window, in particles
 
+bool has_as_many(const SheetShape& shape, int particles) {
+  const auto* grid = std::get_if<Grid>(&shape);
+  return grid != nullptr && grid->rows * grid->columns >= particles;
+}
+
 }  // namespace
 
-bool is_large(const SheetShape& shape) {
-  constexpr int kLarge = 512 * 512;
-  const auto* grid = std::get_if<Grid>(&shape);
-  return grid != nullptr && grid->rows * grid->columns >= kLarge;
-}
+bool is_large(const SheetShape& shape) { return has_as_many(shape, 512 * 512); }
+bool is_sampled(const SheetShape& shape) { return has_as_many(shape, 128 * 128); }
 
 LatticeSample sample_of(const Grid& grid, const Mesh& mesh, int particle) {
   const auto first = [](int middle, int all) {

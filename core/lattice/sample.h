@@ -13,10 +13,12 @@ struct LatticeSample {
   std::vector<int> particles;  // of the lattice
 };
 
-// Whether all of it would take longer than users wait.
+// Whether all of it would take longer than users wait: for anything, and for the estimate of its
+// step at one shape.
 bool is_large(const SheetShape& shape);
+bool is_sampled(const SheetShape& shape);
 
-// At its first corner, or about a particle. Precondition: is_large(grid).
+// At its first corner, or about a particle. Precondition: is_sampled(grid).
 LatticeSample sample_of(const Grid& grid, const Mesh& mesh, int particle = 0);
 
 // Where the connections that stretch are strained most.

@@ -17,7 +17,10 @@ Vector3d offset_at(const Path& path, double time) {
 
 SolverSettings default_settings(Accuracy accuracy) {
   SolverSettings settings;
-  if (accuracy == Accuracy::kDraft) settings.max_self_weight_strain = 0.01;
+  if (accuracy == Accuracy::kDraft) {
+    settings.max_self_weight_strain = 0.01;
+    settings.step_bound = StepBound::kUnsheared;
+  }
   if (accuracy == Accuracy::kFine) {
     settings.precision = Precision::kDouble;
     settings.safety /= 4;

@@ -139,6 +139,12 @@ enum class IntegratorKind { kVerlet, kEuler, kMidpoint, kRk4 };
 // Of positions and forces while stepping.
 enum class Precision { kSingle, kDouble };
 
+// What shapes a step is planned for.
+enum class StepBound {
+  kEveryShape,
+  kUnsheared  // in which threads cross nearly as in the flat sheet
+};
+
 struct SolverSettings {
   IntegratorKind integrator = IntegratorKind::kVerlet;
   Precision precision = Precision::kSingle;
@@ -148,6 +154,7 @@ struct SolverSettings {
   std::optional<double> substep;  // asked for, s
   bool allow_unstable = false;
   double safety = 0.9;  // planned substep / linear bound
+  StepBound step_bound = StepBound::kEveryShape;
   // Most halvings of the step by the guard; 0: only what is not finite stops a run.
   int max_repairs = 12;
   // Most that a sheet may stretch under its own weight: stiffer textiles are simulated as soft as
@@ -158,7 +165,7 @@ struct SolverSettings {
 // How close to its equations a scene is computed that does not say it value by value; the interface
 // has the errors.
 enum class Accuracy {
-  kDraft,     // sheets stretch by 1 % under their weight where their textile would less
+  kDraft,     // sheets stretch by 1 % under their weight where their textile would less; long steps
   kStandard,  // errors are far below what the mesh makes
   kFine       // double precision and a quarter of the step
 };

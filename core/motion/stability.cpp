@@ -25,35 +25,77 @@ struct Block {
   double along, across;
 };
 
-// a K + b C over vectors of (D x particles), scaled by 1/sqrt(mass) on both sides. One dimension
-// serves the graph Laplacian, three the Jacobian.
-template <int D>
-class Operator {
- public:
-  using Point = Eigen::Matrix<double, D, 1>;
-  using Points = Eigen::Matrix<double, D, Eigen::Dynamic>;
+double stiffness_of(const Family& family) {
+  return family.bend ? family.bend->largest_slope() : family.stiffness;
+}
 
-  Operator(const Mesh& mesh, const VectorXd& inverse_mass, double damping, double air_rate)
+// a K + b C over vectors, scaled by 1/sqrt(mass) on both sides: of the graph Laplacian of the
+// largest stiffness of each connection, one value for each particle.
+class Graph {
+ public:
+  Graph(const Mesh& mesh, const VectorXd& inverse_mass, double damping, double air_rate)
+      : mesh_(mesh), scale_(inverse_mass.cwiseSqrt()), damping_(damping), air_rate_(air_rate) {
+    for (const Family& family : mesh.families) stiffness_.push_back(stiffness_of(family));
+  }
+
+  void set_factors(double stiffness, double damping) { a_ = stiffness, b_ = damping; }
+  Eigen::Index size() const { return scale_.size(); }
+
+  VectorXd operator()(const VectorXd& in) const {
+    const VectorXd y = in.cwiseProduct(scale_);
+    VectorXd out = VectorXd::Zero(in.size());
+    for (std::size_t k = 0; k < stiffness_.size(); ++k) {
+      const double pull = a_ * stiffness_[k] + b_ * damping_;
+      for (const auto& [i, j] : mesh_.families[k].connections) {
+        const double f = pull * (y[i] - y[j]);
+        out[i] += f;
+        out[j] -= f;
+      }
+    }
+    for (const Stencil& stencil : mesh_.stencils) {
+      double sum = 0;
+      for (std::size_t k = 0; k < 4; ++k) sum += stencil.weight[k] * y[stencil.particle[k]];
+      sum *= a_ * stencil.stiffness;
+      for (std::size_t k = 0; k < 4; ++k) out[stencil.particle[k]] += stencil.weight[k] * sum;
+    }
+    for (Eigen::Index i = 0; i < in.size(); ++i) {
+      out[i] *= scale_[i];
+      if (scale_[i] > 0) out[i] += b_ * air_rate_ * in[i];
+    }
+    return out;
+  }
+
+ private:
+  const Mesh& mesh_;
+  VectorXd scale_;
+  double damping_, air_rate_;
+  double a_ = 1, b_ = 0;
+  std::vector<double> stiffness_;  // of each family, N/m
+};
+
+// The same of connections' Jacobian, over (3 x particles).
+class Jacobian {
+ public:
+  Jacobian(const Mesh& mesh, const VectorXd& inverse_mass, double damping, double air_rate)
       : mesh_(mesh), scale_(inverse_mass.cwiseSqrt()), damping_(damping), air_rate_(air_rate) {}
 
   void add(const Block& block) { blocks_.push_back(block); }
   void set_factors(double stiffness, double damping) { a_ = stiffness, b_ = damping; }
-  Eigen::Index size() const { return scale_.size() * D; }
+  Eigen::Index size() const { return 3 * scale_.size(); }
 
   VectorXd operator()(const VectorXd& in) const {
-    const Eigen::Map<const Points> given(in.data(), D, scale_.size());
-    const Points y = given * scale_.asDiagonal();
-    Points out = Points::Zero(D, scale_.size());
+    const Eigen::Map<const Matrix3Xd> given(in.data(), 3, scale_.size());
+    const Matrix3Xd y = given * scale_.asDiagonal();
+    Matrix3Xd out = Matrix3Xd::Zero(3, scale_.size());
     for (const Block& block : blocks_) {
-      const Point difference = y.col(block.i) - y.col(block.j);
-      Point f = (a_ * block.across + b_ * damping_) * difference;
-      if constexpr (D == 3)
-        f += a_ * (block.along - block.across) * block.direction.dot(difference) * block.direction;
+      const Vector3d difference = y.col(block.i) - y.col(block.j);
+      Vector3d f = (a_ * block.across + b_ * damping_) * difference;
+      f += a_ * (block.along - block.across) * block.direction.dot(difference) * block.direction;
       out.col(block.i) += f;
       out.col(block.j) -= f;
     }
     for (const Stencil& stencil : mesh_.stencils) {
-      Point sum = Point::Zero();
+      Vector3d sum = Vector3d::Zero();
       for (std::size_t k = 0; k < 4; ++k) sum += stencil.weight[k] * y.col(stencil.particle[k]);
       sum *= a_ * stencil.stiffness;
       for (std::size_t k = 0; k < 4; ++k) out.col(stencil.particle[k]) += stencil.weight[k] * sum;
@@ -62,7 +104,7 @@ class Operator {
       out.col(i) *= scale_[i];
       if (scale_[i] > 0) out.col(i) += b_ * air_rate_ * given.col(i);
     }
-    return Eigen::Map<const VectorXd>(out.data(), out.size());
+    return out.reshaped();
   }
 
  private:
@@ -77,13 +119,15 @@ class Operator {
 // of its largest eigenvalue.
 class SurfaceOperator {
  public:
+  // threads_at: those of an element.
+  template <class F>
   SurfaceOperator(const Mesh& mesh, const VectorXd& inverse_mass, double air_rate,
-                  const Matrix3Xd& x)
+                  const F& threads_at)
       : mesh_(mesh), scale_(inverse_mass.cwiseSqrt().cast<float>()), air_rate_(air_rate) {
     const Surface& surface = mesh.surface;
     tangents_.reserve(surface.membrane.size());
     for (const MembraneElement& element : surface.membrane)
-      tangents_.push_back(tangent_of(surface, element, x));
+      tangents_.push_back(tangent_of(surface, element, threads_at(element)));
     for (const CurvatureFit& fit : surface.fits) {
       const Vector3d root = fit_stiffness(surface, fit).cwiseSqrt();
       fits_.push_back(static_cast<int>(fit.particle.size()));
@@ -142,9 +186,8 @@ class SurfaceOperator {
   }
 
   static Tangent tangent_of(const Surface& surface, const MembraneElement& element,
-                            const Matrix3Xd& x) {
+                            const Threads& threads) {
     MembraneStiffness stiffness = surface.stretch[static_cast<std::size_t>(element.panel)];
-    const Threads threads = threads_of(element, x);
     const MembraneStrain strain = strain_of(threads);
     const MembraneStrain under = stress(stiffness, strain, surface.pushes);
     if (!surface.pushes && strain.warp < 0) stiffness.warp = 0;
@@ -287,9 +330,8 @@ double velocity_step(IntegratorKind kind, double stiffness, double damping, doub
   }
 }
 
-template <int D>
-double limit(IntegratorKind kind, Operator<D>& matrix, double stiffness, double damping,
-             double ratio) {
+template <class Matrix>
+double limit(IntegratorKind kind, Matrix& matrix, double stiffness, double damping, double ratio) {
   return kind == IntegratorKind::kVerlet ? verlet_step(matrix, stiffness, damping, 1e-4)
                                          : velocity_step(kind, stiffness, damping, ratio);
 }
@@ -308,19 +350,6 @@ Block jacobian_block(const Family& family, const Connection& connection, const M
   }
   if (length < family.rest_length && !family.pushes) return {i, j, direction, 0, 0};
   return {i, j, direction, family.stiffness, family.stiffness * (1 - family.rest_length / length)};
-}
-
-double stiffness_of(const Family& family) {
-  return family.bend ? family.bend->largest_slope() : family.stiffness;
-}
-
-Operator<1> graph_of(const Mesh& mesh, const VectorXd& inverse_mass, double damping,
-                     double air_rate) {
-  Operator<1> graph(mesh, inverse_mass, damping, air_rate);
-  for (const Family& family : mesh.families)
-    for (const auto& [i, j] : family.connections)
-      graph.add({i, j, Vector3d::Zero(), stiffness_of(family), stiffness_of(family)});
-  return graph;
 }
 
 // Of stiffness K + damping C.
@@ -387,6 +416,16 @@ SurfaceStep bounded_step(const Mesh& mesh, const VectorXd& inverse_mass, Integra
   return step;
 }
 
+// The step of Verlet, or of another integrator; gamma: a bound of what damps, 1/s.
+double limit(IntegratorKind kind, SurfaceOperator& matrix, double gamma) {
+  const double stiffness = eigenvalue(matrix, 1, 0);
+  const double apart = limit(kind, stiffness, gamma);
+  // only where damping counts do both have to be seen together
+  constexpr double kCounts = 0.005, kLastChange = 0.02;
+  if (kind != IntegratorKind::kVerlet || apart * gamma <= kCounts) return apart;
+  return verlet_step(matrix, stiffness, gamma, kLastChange);
+}
+
 // The bound holds up to a strain of kBoundStrain, or up to that of the shape; the estimate takes
 // the Jacobian at x.
 StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
@@ -398,13 +437,9 @@ StableStep surface_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrat
   step.linear_bound = bound;
   step.limiting_particle = limiting;
 
-  SurfaceOperator jacobian(mesh, inverse_mass, air_rate, x);
-  const double stiffness = eigenvalue(jacobian, 1, 0);
-  step.estimate = limit(integrator, stiffness, gamma);
-  // only where damping counts do both have to be seen together
-  constexpr double kCounts = 0.005, kLastChange = 0.02;
-  if (integrator == IntegratorKind::kVerlet && step.estimate * gamma > kCounts)
-    step.estimate = verlet_step(jacobian, stiffness, gamma, kLastChange);
+  SurfaceOperator jacobian(mesh, inverse_mass, air_rate,
+                           [&](const MembraneElement& element) { return threads_of(element, x); });
+  step.estimate = limit(integrator, jacobian, gamma);
   const Rates unstrained =
       largest_rates(mesh, inverse_mass, mesh.damping, surface_bound(mesh, 0.0));
   step.connection_ratio = unstrained.damping_ratio();
@@ -424,11 +459,12 @@ StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrato
                        double air_rate, const Matrix3Xd& x) {
   if (!mesh.surface.membrane.empty() || !mesh.surface.fits.empty())
     return surface_step(mesh, inverse_mass, integrator, air_rate, x);
-  Operator<1> graph = graph_of(mesh, inverse_mass, mesh.damping, air_rate);
-  Operator<3> jacobian(mesh, inverse_mass, mesh.damping, air_rate);
+  Graph graph(mesh, inverse_mass, mesh.damping, air_rate);
+  Jacobian jacobian(mesh, inverse_mass, mesh.damping, air_rate);
   double largest_stiffness = 0;
   for (const Family& family : mesh.families) {
     largest_stiffness = std::max(largest_stiffness, stiffness_of(family));
+    if (x.size() == 0) continue;
     for (const Connection& connection : family.connections)
       jacobian.add(jacobian_block(family, connection, x));
   }
@@ -440,16 +476,40 @@ StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrato
 
   StableStep step;
   step.linear_bound = limit(integrator, graph, omega2, gamma, ratio);
-  step.estimate = limit(integrator, jacobian, eigenvalue(jacobian, 1, 0), gamma, ratio);
+  step.estimate = x.size() == 0
+                      ? kInfinity
+                      : limit(integrator, jacobian, eigenvalue(jacobian, 1, 0), gamma, ratio);
   step.damping_ratio = omega2 > 0 ? gamma / (2 * std::sqrt(omega2)) : 0;
   step.connection_ratio = step.damping_ratio;
   if (omega2 == 0)
     step.connection_ratio = kInfinity;
   else if (air_rate > 0) {
-    Operator<1> connections = graph_of(mesh, inverse_mass, mesh.damping, 0);
+    Graph connections(mesh, inverse_mass, mesh.damping, 0);
     step.connection_ratio = eigenvalue(connections, 0, 1) / (2 * std::sqrt(omega2));
   }
   return step;
+}
+
+double unsheared_gain(const Mesh& mesh, const VectorXd& inverse_mass, double air_rate,
+                      const Matrix3Xd& flat) {
+  constexpr auto kVerlet = IntegratorKind::kVerlet;
+  if (!mesh.surface.membrane.empty() || !mesh.surface.fits.empty()) {
+    const SurfaceStep any =
+        bounded_step(mesh, inverse_mass, kVerlet, air_rate, surface_bound(mesh, 0.0));
+    SurfaceOperator at_rest(mesh, inverse_mass, air_rate, [](const MembraneElement&) {
+      return Threads{Vector3d::UnitX(), Vector3d::UnitY()};
+    });
+    return std::max(1.0, limit(kVerlet, at_rest, any.damping) / any.bound);
+  }
+  Graph graph(mesh, inverse_mass, mesh.damping, air_rate);
+  Jacobian taut(mesh, inverse_mass, mesh.damping, air_rate);
+  for (const Family& family : mesh.families)
+    for (const auto& [i, j] : family.connections)
+      taut.add({i, j, (flat.col(j) - flat.col(i)).normalized(), stiffness_of(family), 0});
+  const double gamma = mesh.damping > 0 || air_rate > 0 ? eigenvalue(graph, 0, 1) : 0;
+  const double any = verlet_step(graph, eigenvalue(graph, 1, 0), gamma, 1e-4);
+  const double unsheared = verlet_step(taut, eigenvalue(taut, 1, 0), gamma, 1e-4);
+  return any < kInfinity ? std::max(1.0, unsheared / any) : 1;
 }
 
 double damping_for(const Mesh& mesh, double ratio) {
@@ -458,7 +518,7 @@ double damping_for(const Mesh& mesh, double ratio) {
         largest_rates(mesh, mesh.mass.cwiseInverse(), 1, surface_bound(mesh, 0.0)).damping_ratio();
     return unit > 0 && unit < kInfinity ? ratio / unit : 0;
   }
-  Operator<1> graph = graph_of(mesh, mesh.mass.cwiseInverse(), 1, 0);
+  Graph graph(mesh, mesh.mass.cwiseInverse(), 1, 0);
   const double omega2 = eigenvalue(graph, 1, 0);
   return omega2 > 0 ? ratio * 2 * std::sqrt(omega2) / eigenvalue(graph, 0, 1) : 0;
 }
@@ -469,6 +529,13 @@ double safe_share(double connection_ratio) {
   const double along =
       std::log(std::max(connection_ratio, kAtRatio) / kAtRatio) / std::log(kSafe / kAtRatio);
   return std::lerp(kLeast, kMost, along);
+}
+
+double unsheared_share(const Mesh& mesh, double connection_ratio) {
+  constexpr double kNone = 2e-3, kAll = 1e-2, kSwitching = 0.75;
+  const bool switches = mesh.surface.membrane.empty() || !mesh.surface.pushes;
+  const double damped = std::log(connection_ratio / kNone) / std::log(kAll / kNone);
+  return (switches ? kSwitching : 1) * std::clamp(damped, 0.0, 1.0);
 }
 
 }  // namespace weft

@@ -19,7 +19,7 @@ struct StableStep {
 // dt^2 K + 4 dt C < 4 M. The bound replaces K by the graph Laplacian of the largest stiffness of
 // each connection, whatever its direction, and of triangles by diagonal matrices that bound theirs
 // (surface_bound.h); the estimate takes the Jacobian at x. air_rate: damping
-// by wind, 1/s. x: (3 x n) m.
+// by wind, 1/s. x: (3 x n) m; empty, of a lattice: without an estimate.
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                        double air_rate, const Matrix3Xd& x);
 
@@ -27,6 +27,12 @@ StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrato
 // than kBoundStrain or as much as at x, s.
 double linear_bound(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                     double air_rate, const Matrix3Xd& x);
+
+// How many times as long Verlet's linear bound is for shapes in which threads cross as in the flat
+// one, however they are bent; 1 or more. flat: positions of a lattice in its plane (3 x n) m;
+// triangles have their own.
+double unsheared_gain(const Mesh& mesh, const VectorXd& inverse_mass, double air_rate,
+                      const Matrix3Xd& flat);
 
 // The k_d with which the stiffest mode of a sheet that nothing holds has a damping ratio, kg/s; 0
 // where nothing is stiff.
@@ -37,5 +43,9 @@ double damping_for(const Mesh& mesh, double ratio);
 // `./dev bench stability`: at 0.9 of the bound growth begins below ratios of 1e-4 to 9e-4, at 0.45
 // below 1e-4.
 double safe_share(double connection_ratio);
+
+// The share of what unsheared_gain() adds that may be taken: longer steps feed connections that
+// switch and are damped little. From campaigns of random sheets, as safe_share() is.
+double unsheared_share(const Mesh& mesh, double connection_ratio);
 
 }  // namespace weft

@@ -33,6 +33,9 @@ constexpr std::array kAccuracies = {Accuracy::kStandard, Accuracy::kDraft, Accur
                                     Accuracy::kFine};
 constexpr std::array kPrecisions = {Precision::kSingle, Precision::kSingle, Precision::kDouble};
 
+constexpr std::array kStepBounds = {StepBound::kEveryShape, StepBound::kEveryShape,
+                                    StepBound::kUnsheared};
+
 std::string at(const std::string& field, int index) {
   return field + "[" + std::to_string(index) + "]";
 }
@@ -102,7 +105,7 @@ class Reader {
   Collider collider(const v1::Collider& from, const std::string& field);
   Dressing dressing(const v1::Dressing& from, const std::vector<SheetDefinition>& sheets);
   Environment environment(const v1::Environment& from);
-  SolverSettings solver(const v1::SolverSettings& from);
+  SolverSettings solver(const v1::SolverSettings& from, bool dressed);
 
   template <class Source>
   std::shared_ptr<const v1::MeshData> mesh(const Source& from, const std::string& field);
@@ -135,7 +138,7 @@ Scene Reader::scene(const v1::Scene& from) {
   if (from.has_untangle_s()) scene.untangle = from.untangle_s();
   if (from.has_dressing()) scene.dressing = dressing(from.dressing(), scene.sheets);
   scene.environment = environment(from.environment());
-  scene.solver = solver(from.solver());
+  scene.solver = solver(from.solver(), from.has_dressing());
   return scene;
 }
 
@@ -390,9 +393,13 @@ Environment Reader::environment(const v1::Environment& from) {
   return environment;
 }
 
-SolverSettings Reader::solver(const v1::SolverSettings& from) {
+SolverSettings Reader::solver(const v1::SolverSettings& from, bool dressed) {
   SolverSettings solver = default_settings(accuracy_);
   solver.integrator = choice(kIntegrators, from.integrator(), "solver.integrator");
+  if (from.step_bound() != v1::STEP_BOUND_UNSPECIFIED)
+    solver.step_bound = choice(kStepBounds, from.step_bound(), "solver.step_bound");
+  else if (dressed && accuracy_ == Accuracy::kStandard)
+    solver.step_bound = StepBound::kUnsheared;
   if (from.precision() != v1::PRECISION_UNSPECIFIED)
     solver.precision = choice(kPrecisions, from.precision(), "solver.precision");
   if (from.has_frame_step_s()) solver.frame_step = from.frame_step_s();

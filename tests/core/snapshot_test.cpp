@@ -47,6 +47,7 @@ void expect_same(const Simulation& found, const Simulation& wanted) {
   EXPECT_EQ(a.halvings, b.halvings);
   EXPECT_EQ(a.plan.step.substep, b.plan.step.substep);
   EXPECT_EQ(a.plan.step.estimated_bound, b.plan.step.estimated_bound);
+  EXPECT_EQ(a.plan.step.unsheared_bound, b.plan.step.unsheared_bound);
   EXPECT_EQ(a.plan.passes, b.plan.passes);
   EXPECT_EQ(a.repairs.size(), b.repairs.size());
   EXPECT_EQ(found.stats().kinetic_energy, wanted.stats().kinetic_energy);
@@ -124,6 +125,11 @@ const Variant kVariants[] = {
      [](Scene& scene) {
        std::get<RawTextile>(scene.sheets[0].textile.model).stretch = 50;
        scene.sheets[0].tether_stretch = 0;
+     }},
+    {"UnshearedStep",
+     [](Scene& scene) {
+       scene.sheets[0].textile.damping_ratio = 0.02;
+       scene.solver.step_bound = StepBound::kUnsheared;
      }},
 };
 

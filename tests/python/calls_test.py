@@ -78,7 +78,7 @@ class Interface(unittest.TestCase):
         enums = {}
         for messages, _ in [*calls.SERVICES, (weft.v1.scene_pb2, None)]:
             enums.update(messages.DESCRIPTOR.enum_types_by_name)
-        for name in ["Evaluator", "Accuracy", "Integrator", "Precision", "LabTest", "LabDirection",
+        for name in ["Evaluator", "Accuracy", "Integrator", "Precision", "StepBound", "LabTest", "LabDirection",
                      "LabMesh", "Encoding"]:
             enum = enums["FrameEncoding" if name == "Encoding" else name]
             prefix = enum.values[0].name.removesuffix("UNSPECIFIED")

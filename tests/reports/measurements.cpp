@@ -119,8 +119,8 @@ Measured measure(const Case& given, int frames, bool large) {
   };
   for (const Setting& setting : settings)
     measured.points.push_back(point_of(setting, run(given, setting, frames)));
-  for (const auto& [name, accuracy] : kAccuracies)
-    measured.accuracies.push_back(point_of({}, run(given, accuracy, frames)));
+  for (const NamedAccuracy& stated : kAccuracies)
+    measured.accuracies.push_back(point_of({}, run(given, stated, frames)));
   // short runs once more, and again, but not at once: what disturbs one does not last
   constexpr double kShort = 0.2;  // s
   for (int repeat = 0; repeat < 2; ++repeat) {
@@ -129,7 +129,7 @@ Measured measure(const Case& given, int frames, bool large) {
         point.time = std::min(point.time, run(given, point.setting, frames).time);
     for (std::size_t k = 0; k < kAccuracies.size(); ++k)
       measured.accuracies[k].time =
-          std::min(measured.accuracies[k].time, run(given, kAccuracies[k].second, frames).time);
+          std::min(measured.accuracies[k].time, run(given, kAccuracies[k], frames).time);
   }
   return measured;
 }

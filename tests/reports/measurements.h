@@ -16,9 +16,10 @@ inline constexpr ChoiKo kFinePolynomial{.evaluator = Evaluator::kPolynomial, .de
 inline constexpr std::array kSegments = {2, 5, 8, 16, 32, 60, 128, 256, 1024};
 inline constexpr std::array kOptimal = {5, 16, 32, 60};
 inline constexpr std::array kFolded = {2, 5, 60};  // as the paper's figure 7 has them
-inline constexpr std::array kAccuracies = {std::pair{"DRAFT", Accuracy::kDraft},
-                                           std::pair{"STANDARD", Accuracy::kStandard},
-                                           std::pair{"FINE", Accuracy::kFine}};
+inline constexpr std::array kAccuracies = {
+    NamedAccuracy{"DRAFT", Accuracy::kDraft}, NamedAccuracy{"STANDARD", Accuracy::kStandard},
+    NamedAccuracy{"FINE", Accuracy::kFine},
+    NamedAccuracy{"STANDARD, UNSHEARED", Accuracy::kStandard, StepBound::kUnsheared}};
 
 // A setting and how far from the truth it ends.
 struct Point {

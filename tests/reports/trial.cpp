@@ -213,10 +213,11 @@ Outcome run(const Case& given, const Setting& setting, int frames) {
   return run(begin(given, setting), frames);
 }
 
-Outcome run(const Case& given, Accuracy accuracy, int frames) {
+Outcome run(const Case& given, const NamedAccuracy& stated, int frames) {
   Scene scene = given.scene;
-  scene.solver = default_settings(accuracy);
-  if (!given.triangles) scene.sheets[0].bending = default_bending(accuracy);
+  scene.solver = default_settings(stated.accuracy);
+  scene.solver.step_bound = stated.step_bound.value_or(scene.solver.step_bound);
+  if (!given.triangles) scene.sheets[0].bending = default_bending(stated.accuracy);
   return run(Simulation(std::move(scene)), frames);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -60,8 +61,13 @@ struct Outcome {
   bool finite = false;
 };
 Outcome run(const Case& given, const Setting& setting, int frames);
-// As a scene is computed that states no more than an accuracy.
-Outcome run(const Case& given, Accuracy accuracy, int frames);
+// What a scene states that states no more.
+struct NamedAccuracy {
+  const char* name;
+  Accuracy accuracy;
+  std::optional<StepBound> step_bound{};
+};
+Outcome run(const Case& given, const NamedAccuracy& stated, int frames);
 
 // Frames, at most `most`, in which runs at the planned step and at half of it stay within 1 mm.
 int calm_frames(const Case& given, int most);

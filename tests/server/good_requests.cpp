@@ -160,6 +160,7 @@ v1::Scene full_scene() {
   scene.mutable_solver()->set_frame_step_s(0.01);
   scene.mutable_solver()->set_substep_s(1e-5);
   scene.mutable_solver()->set_safety(0.8);
+  scene.mutable_solver()->set_step_bound(v1::STEP_BOUND_UNSHEARED);
   scene.mutable_solver()->set_max_repairs(5);
   scene.mutable_solver()->set_max_self_weight_strain(0.5);
   return scene;

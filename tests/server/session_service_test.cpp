@@ -212,6 +212,8 @@ TEST(Accuracy, SetsWhatASceneLeavesOpenAndNothingElse) {
   const v1::Session draft = created(v1::ACCURACY_DRAFT);
   EXPECT_EQ(draft.scene().solver().max_self_weight_strain(), 0.01);
   EXPECT_EQ(draft.scene().solver().safety(), 0.9);
+  EXPECT_EQ(draft.scene().solver().step_bound(), v1::STEP_BOUND_UNSHEARED);
+  EXPECT_EQ(standard.scene().solver().step_bound(), v1::STEP_BOUND_EVERY_SHAPE);
 
   const v1::Session fine = created(v1::ACCURACY_FINE);
   EXPECT_EQ(fine.scene().solver().precision(), v1::PRECISION_DOUBLE);
@@ -225,6 +227,15 @@ TEST(Accuracy, SetsWhatASceneLeavesOpenAndNothingElse) {
   EXPECT_EQ(given.scene().solver().safety(), 0.5);
   EXPECT_EQ(given.scene().solver().precision(), v1::PRECISION_SINGLE);
   EXPECT_TRUE(given.scene().sheets(0).bending().has_isometric());
+
+  scene.mutable_dressing();
+  EXPECT_EQ(created(v1::ACCURACY_STANDARD).scene().solver().step_bound(),
+            v1::STEP_BOUND_UNSHEARED);
+  EXPECT_EQ(created(v1::ACCURACY_FINE).scene().solver().step_bound(),
+            v1::STEP_BOUND_EVERY_SHAPE);
+  scene.mutable_solver()->set_step_bound(v1::STEP_BOUND_EVERY_SHAPE);
+  EXPECT_EQ(created(v1::ACCURACY_STANDARD).scene().solver().step_bound(),
+            v1::STEP_BOUND_EVERY_SHAPE);
 }
 
 TEST(UpdateTextile, ChangesAWholeTextileFromTheNextFrameOn) {

@@ -24,6 +24,7 @@ Evaluator = Literal["SERIES", "EXACT", "LINEARIZED", "POLYNOMIAL"]
 Accuracy = Literal["DRAFT", "STANDARD", "FINE"]
 Integrator = Literal["VERLET", "EULER", "MIDPOINT", "RK4"]
 Precision = Literal["SINGLE", "DOUBLE"]
+StepBound = Literal["EVERY_SHAPE", "UNSHEARED"]
 LabTest = Literal["TENSILE", "SHEAR", "BENDING", "CANTILEVER", "CHAIN", "DRAPE"]
 LabDirection = Literal["WARP", "WEFT"]
 LabMesh = Literal["LATTICE", "RIGHT", "ALTERNATING", "EQUILATERAL", "IRREGULAR"]
@@ -451,6 +452,7 @@ class SolverSettings(Value):
     precision: Precision | None = None
     max_repairs: int | None = None
     max_self_weight_strain: float | None = None
+    step_bound: StepBound | None = None
 
 
 @dataclass(eq=False)

@@ -324,6 +324,7 @@ void expect_equal(const Session& found, const Session& wanted) {
   EXPECT_EQ(a.newest->substeps, b.newest->substeps);
   EXPECT_EQ(a.textiles, b.textiles);
   EXPECT_EQ(a.plan->step.estimated_bound, b.plan->step.estimated_bound);
+  EXPECT_EQ(a.plan->step.unsheared_bound, b.plan->step.unsheared_bound);
 }
 
 TEST_F(SessionLogTest, WithASnapshotComputesOnlyWhatCameAfterIt) {

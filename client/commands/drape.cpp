@@ -25,7 +25,7 @@ namespace {
 struct DrapeOptions {
   Drape drape;
   Person person;
-  std::string textile = kUsualTextile;
+  std::string textile;
   std::vector<std::string> values;
   double seconds = 20;
   std::string output, page, recording;
@@ -177,7 +177,7 @@ void run_drape(Context& context, const DrapeOptions& options) {
   context.prefer_embedded();
   Drape drape = options.drape;
   drape.measures = measures_by_options(options.person);
-  drape.textile = textile_named(options.textile);
+  if (!options.textile.empty()) drape.textile = textile_named(options.textile);
   for (const std::string& value : options.values) drape.values.push_back(read_setting(value));
   const GarmentScene made = make_drape(context.connection(), drape);
   const v1::Session session = create_session(context.connection(), made.scene);
@@ -218,10 +218,11 @@ void add_drape(CLI::App& app, Context& context) {
       ->type_name("FILE")
       ->allow_extra_args(false);
   command
-      ->add_option("--textile", options->textile,
-                   "Preset (weft textile list), or a file (weft textile new)")
-      ->option_text("NAME|FILE.json")
-      ->capture_default_str();
+      ->add_option(
+          "--textile", options->textile,
+          "Preset (weft textile list), or a file (weft textile new); else denim_11oz for a "
+          "skirt, wool_tropical for a dress, jersey_interlock for all else")
+      ->option_text("NAME|FILE.json");
   command
       ->add_option("--edge", options->drape.edge_m,
                    "Wanted length of triangles' edges, m; else 0.01")

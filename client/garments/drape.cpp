@@ -7,6 +7,7 @@
 #include "client/garments/pattern_file.h"
 #include "client/message_field.h"
 #include "client/output/text.h"
+#include "client/textile_file.h"
 
 namespace weft::client {
 namespace {
@@ -30,12 +31,13 @@ ImportedPattern read_garment(const std::string& path) {
 }
 
 GarmentScene make_drape(Connection& connection, const Drape& drape) {
-  GarmentOrder order{.textile = drape.textile,
-                     .edge_m = drape.edge_m,
-                     .deflate_m = drape.deflate_m,
-                     .edge_field = drape.edge_field};
-  std::string notes;
   const std::optional<GarmentInfo> own = template_called(drape.garment);
+  GarmentOrder order{
+      .textile = drape.textile ? *drape.textile : textile_named(own ? own->textile : kUsualTextile),
+      .edge_m = drape.edge_m,
+      .deflate_m = drape.deflate_m,
+      .edge_field = drape.edge_field};
+  std::string notes;
   std::optional<DressForm> form;
   if (own || drape.bodies.empty()) form = make_dress_form(drape.measures);
   if (own) {

@@ -11,15 +11,12 @@
 
 namespace weft::client {
 
-// Where none is named.
-inline constexpr const char* kUsualTextile = "jersey_interlock";
-
 // Who wears what.
 struct Drape {
-  std::string garment{};              // a template, or a pattern file
-  Measures measures{};                // of the dress form
-  std::vector<std::string> bodies{};  // files; none: the dress form
-  v1::Textile textile{};
+  std::string garment{};                 // a template, or a pattern file
+  Measures measures{};                   // of the dress form
+  std::vector<std::string> bodies{};     // files; none: the dress form
+  std::optional<v1::Textile> textile{};  // none: the usual one
   std::optional<double> edge_m{}, deflate_m{};
   std::optional<v1::Accuracy> accuracy{};
   std::vector<std::pair<std::string, std::string>> values{};  // of the scene, by their places

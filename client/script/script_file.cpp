@@ -239,6 +239,7 @@ class ScriptReader {
   // Its files are read here to find what is wrong with them.
   Drape read_drape(Fields& fields, const TemplateOptions& options) const {
     Drape drape{.measures = read_measures(fields),
+                .textile = options.textile,
                 .edge_m = fields.number("edge_m", 0.002, 0.1),
                 .deflate_m = fields.number("deflate_m", 0, 0.1),
                 .accuracy = options.accuracy,
@@ -247,7 +248,6 @@ class ScriptReader {
       drape.garment = is_garment_template(*garment) ? *garment : from_here(*garment);
       if (!is_garment_template(*garment))
         try_to(fields, "drape", [&] { read_garment(drape.garment); });
-      drape.textile = options.textile ? *options.textile : textile_named(kUsualTextile);
     }
     for (const std::string& file : fields.texts("body")) {
       drape.bodies.push_back(from_here(file));

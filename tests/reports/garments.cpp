@@ -29,16 +29,16 @@ constexpr double kLongest = 20;  // until a garment is at rest, s
 // A garment of size 40 on the form of its measures.
 struct Order {
   std::string garment;
-  double edge = 0;      // of triangles, m
-  bool capped = false;  // in its stretch under its own weight, at 1 %
-  std::string textile = client::kUsualTextile;
+  double edge = 0;                // of triangles, m
+  bool capped = false;            // in its stretch under its own weight, at 1 %
+  const char* textile = nullptr;  // else the garment's usual one
 };
 
 client::GarmentScene make(client::Connection& connection, const Order& order) {
   client::Drape drape;
   drape.garment = order.garment;
   drape.measures = client::measures_of({.size = 40});
-  drape.textile = client::textile_named(order.textile);
+  if (order.textile != nullptr) drape.textile = client::textile_named(order.textile);
   drape.edge_m = order.edge;
   if (order.capped) drape.values = {{"solver.max_self_weight_strain", "0.01"}};
   return client::make_drape(connection, drape);
@@ -284,7 +284,7 @@ void Garments::refinement() {
   if (wanted("the skirt of 1 cm")) edges.push_back(0.01);
   std::vector<Row> rows;
   for (const double edge : edges) {
-    const client::GarmentScene made = make(*connection_, {"skirt", edge, true, "wool_tropical"});
+    const client::GarmentScene made = make(*connection_, {"skirt", edge, true});
     Simulation simulation = simulate(made.scene);
     const Passage passage = follow_until(simulation, kLongest, true);
     const Matrix3Xd x = testing::positions(simulation);
@@ -304,7 +304,7 @@ void Garments::refinement() {
                "hem's height mm", "shadow m²", "verdict"},
               rows);
   page_.text(
-      "A skirt of tropical wool at rest: how long its waist is, how high waist and hem are in the "
+      "The skirt at rest: how long its waist is, how high waist and hem are in the "
       "mean, and the area of its shadow, seen from above.");
 }
 
@@ -343,11 +343,10 @@ void garments(const std::filesystem::path& folder, const std::string& commit, bo
   Page page(folder, {"what", "scene", "particles", "processor_s", "a", "b", "c"});
   page.text("# Garments");
   page.text(fmt::format(
-      "Made by `./dev bench garments{}` on {}. Garments of our own for size 40, of "
-      "interlock jersey if not said otherwise, on the dress form of its measures (`weft drape`). "
-      "Processor "
-      "seconds are of the cores that did the work, wall seconds depend on what else the "
-      "machine does.",
+      "Made by `./dev bench garments{}` on {}. Garments of our own for size 40, the T-shirt of "
+      "interlock jersey, the dress of tropical wool, the skirt of denim, on the dress form of its "
+      "measures (`weft drape`). Processor seconds are of the cores that did the work, wall seconds "
+      "depend on what else the machine does.",
       large ? " --large" : "", machine(commit)));
   Garments(page, large).write();
   page.write();

@@ -304,7 +304,8 @@ void Garments::refinement() {
                "hem's height mm", "shadow m²", "verdict"},
               rows);
   page_.text(
-      "The skirt at rest: how long its waist is, how high waist and hem are in the "
+      "The skirt at rest, its stretch capped at 1 %: how long its waist is, how high waist and hem "
+      "are in the "
       "mean, and the area of its shadow, seen from above.");
 }
 

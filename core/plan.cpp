@@ -336,6 +336,24 @@ void warn_of_body(std::size_t index, const Body& body, Plan& plan) {
               "cell_m")});
 }
 
+// "; 30 in panel front, 15 in panel sleeve", of those on a seam in the first.
+std::string count_by_panel(const SheetShape& shape, std::vector<bool> particles) {
+  const auto* mesh = std::get_if<Triangles>(&shape);
+  if (mesh == nullptr || (*mesh)->panels.size() < 2) return {};
+  std::string text;
+  auto triangle = (*mesh)->triangles.begin();
+  for (const Panel& panel : (*mesh)->panels) {
+    int count = 0;
+    for (const auto end = triangle + panel.triangles; triangle != end; ++triangle)
+      for (const int i : *triangle) {
+        count += particles[static_cast<std::size_t>(i)] ? 1 : 0;
+        particles[static_cast<std::size_t>(i)] = false;
+      }
+    if (count > 0) text += join(text.empty() ? "; " : ", ", count, " in panel ", panel.name);
+  }
+  return text;
+}
+
 void warn_of_start_inside(const Scene& scene, const std::vector<PlannedSheet>& planned,
                           Plan& plan) {
   std::vector<Matrix3Xd> starts;
@@ -344,15 +362,17 @@ void warn_of_start_inside(const Scene& scene, const std::vector<PlannedSheet>& p
   for (std::size_t c = 0; c < scene.colliders.size(); ++c) {
     const Contacts contacts(std::span(&scene.colliders[c], 1), {}, 0, 0, 0, 0);
     for (std::size_t s = 0; s < starts.size(); ++s) {
-      int inside = 0, first = 0;
+      std::vector<bool> inside;
       for (Eigen::Index i = 0; i < starts[s].cols(); ++i)
-        if (planned[s].inverse_mass[i] != 0 && contacts.gap(starts[s].col(i)) < 0 && inside++ == 0)
-          first = static_cast<int>(i);
-      if (inside > 0)
-        plan.warnings.push_back({"STARTS_INSIDE", join("colliders[", c, "]"),
-                                 join(inside, " particles of sheet \"", scene.sheets[s].name,
-                                      "\" start inside, the first of them ", first,
-                                      ": they are pushed out at ", Contacts::kOutward, " m/s")});
+        inside.push_back(planned[s].inverse_mass[i] != 0 && contacts.gap(starts[s].col(i)) < 0);
+      const auto first = std::ranges::find(inside, true);
+      if (first != inside.end())
+        plan.warnings.push_back(
+            {"STARTS_INSIDE", join("colliders[", c, "]"),
+             join(std::ranges::count(inside, true), " particles of sheet \"", scene.sheets[s].name,
+                  "\" start inside, the first of them ", first - inside.begin(),
+                  count_by_panel(scene.sheets[s].shape, inside), ": they are pushed out at ",
+                  Contacts::kOutward, " m/s")});
     }
   }
 }

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "client/commands/commands.h"
 #include "client/exports/output_file.h"
 #include "client/figures/dress_form.h"
@@ -19,7 +21,7 @@ void run_new_body(Context& context, const BodyOptions& options) {
   const bool binary = options.path.ends_with(".glb");
   if (!binary && !options.path.ends_with(".obj"))
     throw usage_problem("--output " + options.path + ": ends in neither .glb nor .obj");
-  const DressForm form = make_dress_form(measures_of(options.person));
+  const DressForm form = make_dress_form(measures_by_options(options.person));
   write_new_file(options.path, binary ? glb_of(form.mesh) : obj_of(form.mesh), options.replace);
 
   std::string text = fmt::format("stature     {:.3f} m\n", form.stature);
@@ -54,34 +56,24 @@ void add_person(CLI::App& command, Person& person) {
       .add_option("--size", person.size,
                   "As in shops, such as 40 of a woman, 50 of a man; gives the girths not given")
       ->type_name("N");
-  const auto length = [&](const char* name, std::optional<double>& value, const char* description,
-                          double least, double most) {
-    command.add_option(name, value, description)->type_name("M")->check(CLI::Range(least, most));
-  };
-  length("--stature", measures.stature, "Height of the person, m", 1.2, 2.2);
-  length("--bust", measures.bust, "Bust or chest girth, m", 0.6, 1.8);
-  length("--underbust", measures.underbust, "Underbust girth, m", 0.5, 1.7);
-  length("--waist", measures.waist, "Waist girth, m", 0.45, 1.8);
-  length("--top-hip", measures.top_hip, "Top hip girth, m", 0.55, 1.8);
-  length("--hip", measures.hip, "Hip girth, m", 0.6, 1.9);
+  for (const LengthInfo& each : person_lengths()) {
+    std::string name = each.name;
+    std::ranges::replace(name, '_', '-');
+    command.add_option("--" + name, measures.*each.value, each.description)
+        ->type_name("M")
+        ->check(CLI::Range(each.least, each.most));
+  }
   command.add_option("--arm-angle", measures.arm_angle, "Of the arms below the level, degrees")
       ->type_name("DEG")
-      ->check(CLI::Range(0.0, 70.0));
+      ->check(CLI::Range(0.0, kMostArmAngle));
 }
 
-Measures measures_of(const Person& person) {
-  Measures measures = person.measures;
-  if (!person.size) return measures;
-  const bool female = measures.figure == FigureKind::kFemale;
-  const int least = female ? kLeastFemaleSize : kLeastMaleSize,
-            most = female ? kMostFemaleSize : kMostMaleSize;
-  if (*person.size < least || *person.size > most || *person.size % 2 != 0)
-    throw usage_problem(fmt::format("--size: {} is not even and within {} to {}, sizes of a {}",
-                                    *person.size, least, most, female ? "woman" : "man"));
-  const Measures usual = measures_of_size(measures.figure, *person.size);
-  for (const auto girth : {&Measures::bust, &Measures::waist, &Measures::hip})
-    if (!(measures.*girth)) measures.*girth = usual.*girth;
-  return measures;
+Measures measures_by_options(const Person& person) {
+  try {
+    return measures_of(person);
+  } catch (const Violation& violation) {
+    throw usage_problem(fmt::format("--{}: {}", violation.field, violation.description));
+  }
 }
 
 void add_body(CLI::App& app, Context& context) {

@@ -81,13 +81,9 @@ CLI::Validator one_of(const std::map<std::string, Value>& values) {
 }
 
 // Whom a body or a garment is for, by options.
-struct Person {
-  Measures measures;
-  std::optional<int> size{};
-};
 void add_person(CLI::App& command, Person& person);
-// With those of the size where they are not given.
-Measures measures_of(const Person& person);
+// Refuses a size that the figure does not have.
+Measures measures_by_options(const Person& person);
 
 // The positional SESSION.
 void add_session_argument(CLI::App& command, std::string& session);

@@ -9,8 +9,7 @@
 
 #include "client/commands/commands.h"
 #include "client/exports/export.h"
-#include "client/garments/garment_scene.h"
-#include "client/garments/garment_templates.h"
+#include "client/garments/drape.h"
 #include "client/output/status.h"
 #include "client/output/text.h"
 #include "client/page/page.h"
@@ -18,7 +17,6 @@
 #include "client/recording/recorder.h"
 #include "client/recording/writer.h"
 #include "client/templates/templates.h"
-#include "client/textile_file.h"
 
 namespace weft::client {
 namespace {
@@ -93,17 +91,13 @@ std::vector<Run> plan_runs(const DemoOptions& options) {
 
 // A T-shirt that a dress form puts on.
 Run plan_garment(Connection& connection, const DemoOptions& options) {
-  const DressForm form = make_dress_form(measures_of({.measures = {}, .size = 40}));
-  const GarmentScene garment =
-      make_garment_scene(connection, {.name = "tshirt",
-                                      .pattern = make_garment("tshirt", form),
-                                      .textile = textile_named("jersey_interlock"),
-                                      .edge_m = 0.015,
-                                      .bodies = {garment_body(form)}});
   Run run;
   run.name = "tshirt";
-  run.scene = garment.scene;
-  run.scene.mutable_solver()->set_accuracy(v1::ACCURACY_DRAFT);
+  run.scene = make_drape(connection, {.garment = "tshirt",
+                                      .measures = measures_of({.size = 40}),
+                                      .edge_m = 0.015,
+                                      .accuracy = v1::ACCURACY_DRAFT})
+                  .scene;
   run.path = (std::filesystem::path(options.directory) / run.name).string();
   run.last_frame = std::llround(options.longest_time_s * 60);
   return run;

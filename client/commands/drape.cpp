@@ -1,3 +1,5 @@
+#include "client/garments/drape.h"
+
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -7,9 +9,7 @@
 
 #include "client/commands/commands.h"
 #include "client/exports/export.h"
-#include "client/garments/garment_scene.h"
 #include "client/garments/garment_templates.h"
-#include "client/garments/pattern_file.h"
 #include "client/output/status.h"
 #include "client/output/text.h"
 #include "client/page/page.h"
@@ -23,12 +23,10 @@ namespace weft::client {
 namespace {
 
 struct DrapeOptions {
-  std::string garment;
+  Drape drape;
   Person person;
-  std::vector<std::string> bodies;
-  std::string textile = "jersey_interlock";
-  std::optional<double> edge_m, deflate_m;
-  std::optional<v1::Accuracy> accuracy;
+  std::string textile;
+  std::vector<std::string> values;
   double seconds = 20;
   std::string output, page, recording;
   bool replace = false;
@@ -73,12 +71,6 @@ void check(const DrapeOptions& options) {
   for (const std::string& path : {options.output, options.page, options.recording})
     if (!path.empty() && !options.replace && std::filesystem::exists(path))
       throw unwritable(path, "the file exists; --force replaces it");
-}
-
-std::optional<GarmentInfo> template_called(const std::string& name) {
-  for (const GarmentInfo& each : garment_templates())
-    if (each.name == name) return each;
-  return std::nullopt;
 }
 
 // What goes on at a time.
@@ -148,30 +140,6 @@ std::string verdict_text(const v1::Verdict& verdict, const std::vector<v1::Warni
   return facts.text();
 }
 
-// Pattern, bodies and all else that is asked for.
-GarmentOrder read_order(const DrapeOptions& options, std::string& notes) {
-  GarmentOrder order;
-  order.textile = textile_named(options.textile);
-  order.edge_m = options.edge_m;
-  order.deflate_m = options.deflate_m;
-  const std::optional<GarmentInfo> own = template_called(options.garment);
-  std::optional<DressForm> form;
-  if (own || options.bodies.empty()) form = make_dress_form(measures_of(options.person));
-  if (own) {
-    order.name = options.garment;
-    order.pattern = make_garment(options.garment, *form);
-    if (!order.deflate_m && own->deflate_m > 0) order.deflate_m = own->deflate_m;
-  } else {
-    order.name = plain_name(std::filesystem::path(options.garment).stem().string(), "garment");
-    ImportedPattern read = read_pattern(options.garment);
-    order.pattern = std::move(read.pattern);
-    for (const std::string& note : read.notes) notes += note + '\n';
-  }
-  for (const std::string& path : options.bodies) order.bodies.push_back(garment_body(path));
-  if (options.bodies.empty()) order.bodies.push_back(garment_body(*form));
-  return order;
-}
-
 // Writes what is asked for, of a recording whose last frame is that, and tells of it.
 void write_files(const DrapeOptions& options, const std::string& name, const Recorded& recorded,
                  std::int64_t last_frame, Json& document, std::string& text) {
@@ -207,10 +175,11 @@ Problem not_good(const v1::Verdict& verdict) {
 void run_drape(Context& context, const DrapeOptions& options) {
   check(options);
   context.prefer_embedded();
-  std::string text;
-  const GarmentOrder order = read_order(options, text);
-  GarmentScene made = make_garment_scene(context.connection(), order);
-  if (options.accuracy) made.scene.mutable_solver()->set_accuracy(*options.accuracy);
+  Drape drape = options.drape;
+  drape.measures = measures_by_options(options.person);
+  if (!options.textile.empty()) drape.textile = textile_named(options.textile);
+  for (const std::string& value : options.values) drape.values.push_back(read_setting(value));
+  const GarmentScene made = make_drape(context.connection(), drape);
   const v1::Session session = create_session(context.connection(), made.scene);
   const Recorded recorded(options.recording);
   const RecordingResult result = dress(context, session, options, recorded.path());
@@ -223,8 +192,9 @@ void run_drape(Context& context, const DrapeOptions& options) {
   Json document{{"garment", made.json}, {"verdict", to_json(verdict)}, {"session", session.name()}};
   const std::vector<v1::Warning> start = faults_of_start(session.plan());
   for (const v1::Warning& warning : start) document["start"].push_back(to_json(warning));
-  text += made.text + verdict_text(verdict, start, result.tally);
-  write_files(options, order.name, recorded, result.tally.last_frame, document, text);
+  std::string text = made.text + verdict_text(verdict, start, result.tally);
+  write_files(options, made.scene.sheets(0).name(), recorded, result.tally.last_frame, document,
+              text);
   context.answer(document, text);
   if (!verdict.good()) throw not_good(verdict);
 }
@@ -236,30 +206,39 @@ void add_drape(CLI::App& app, Context& context) {
   CLI::App* command =
       app.add_subcommand("drape", "Dress a body in a garment, and judge how it sits");
   command
-      ->add_option("GARMENT", options->garment,
+      ->add_option("GARMENT", options->drape.garment,
                    "Garment (weft garment new --help lists them), or a pattern file")
       ->option_text(" ")
       ->required();
   add_person(*command, options->person);
   command
-      ->add_option("--body", options->bodies,
+      ->add_option("--body", options->drape.bodies,
                    "Closed triangles that wear it instead of the dress form: .obj, .gltf or .glb; "
                    "may be given again")
       ->type_name("FILE")
       ->allow_extra_args(false);
   command
-      ->add_option("--textile", options->textile,
-                   "Preset (weft textile list), or a file (weft textile new)")
-      ->option_text("NAME|FILE.json")
-      ->capture_default_str();
-  command->add_option("--edge", options->edge_m, "Wanted length of triangles' edges, m; else 0.01")
+      ->add_option(
+          "--textile", options->textile,
+          "Preset (weft textile list), or a file (weft textile new); else denim_11oz for a "
+          "skirt, wool_tropical for a dress, jersey_interlock for all else")
+      ->option_text("NAME|FILE.json");
+  command
+      ->add_option("--edge", options->drape.edge_m,
+                   "Wanted length of triangles' edges, m; else 0.01")
       ->type_name("M");
   command
-      ->add_option("--deflate", options->deflate_m,
+      ->add_option("--deflate", options->drape.deflate_m,
                    "By how much bodies are smaller while seams close, m, so that thighs part; else "
                    "0.02 for trousers")
       ->type_name("M");
-  add_accuracy(*command, options->accuracy);
+  add_accuracy(*command, options->drape.accuracy);
+  command
+      ->add_option("--set", options->values,
+                   "One value of the scene by its place, such as "
+                   "solver.max_self_weight_strain=0.01; may be given again")
+      ->option_text("FIELD=VALUE ...")
+      ->allow_extra_args(false);
   command->add_option("--seconds", options->seconds, "Most simulated time until it is at rest, s")
       ->type_name("S")
       ->check(CLI::Range(0.1, 1000.0))

@@ -43,7 +43,7 @@ void write_pattern(Context& context, const v1::Pattern& pattern, const std::stri
 }
 
 void run_new_garment(Context& context, const NewGarmentOptions& options) {
-  const v1::Pattern pattern = make_garment(options.name, measures_of(options.person));
+  const v1::Pattern pattern = make_garment(options.name, measures_by_options(options.person));
   write_pattern(context, pattern, options.path, options.replace, {});
 }
 

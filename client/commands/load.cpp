@@ -9,8 +9,7 @@
 
 #include "client/commands/commands.h"
 #include "client/exports/output_file.h"
-#include "client/garments/garment_scene.h"
-#include "client/garments/garment_templates.h"
+#include "client/garments/drape.h"
 #include "client/input_file.h"
 #include "client/load/garments.h"
 #include "client/load/limit.h"
@@ -19,7 +18,6 @@
 #include "client/output/text.h"
 #include "client/scene_file.h"
 #include "client/templates/templates.h"
-#include "client/textile_file.h"
 
 namespace weft::client {
 namespace {
@@ -330,14 +328,7 @@ void search_limit(Context& context, const LoadOrder& order, double target_s, Pag
 
 // A T-shirt on a form of size 40.
 v1::Scene tshirt_scene(Connection& connection) {
-  const DressForm form = make_dress_form(measures_of({}));
-  GarmentOrder order;
-  order.name = "tshirt";
-  order.pattern = make_garment(order.name, form);
-  order.textile = textile_named("jersey_interlock");
-  order.edge_m = 0.02;
-  order.bodies.push_back(garment_body(form));
-  return make_garment_scene(connection, order).scene;
+  return make_drape(connection, {.garment = "tshirt", .edge_m = 0.02}).scene;
 }
 
 std::string garments_text(const GarmentsResult& result) {

@@ -124,8 +124,12 @@ constexpr const char* kFooter =
     - run: {until_rest: true, until_time_s: $longest}
     - expect: {at_rest: true, largest_strain: {max: 0.05}}
 
-create   template, with the options of `weft scene new`, or scene;
-         fields: {PLACE: VALUE ...}
+create   template, with the options of `weft scene new`, or scene, or drape;
+         fields: {PLACE: VALUE ...};
+         drape is a garment or a pattern file, with what `weft drape` takes:
+         textile, figure, size, stature_m, bust_m, underbust_m, waist_m,
+         top_hip_m, hip_m, arm_angle, or body, files; edge_m, deflate_m,
+         accuracy
 set      textile, a preset or file, or fields: {FIELD: VALUE ...};
          sheet; over_s, else at once
 grab     row, column; sheet; likewise release, pin and unpin
@@ -141,9 +145,11 @@ snapshot snapshot: a name; keeps the session as it is now
 restore  snapshot; session: a new one that goes on from there
 expect   frame, time_s, at_rest, rest_time_s; largest_strain, of all frames;
          strain, cloth_cuts, kinetic_energy_j, potential_energy_j, energy_j,
-         of the newest;
+         of the newest; strain_warp, strain_weft, pressure_pa, slid_m, of its
+         verdict;
          particle: {sheet, row, column, x_m, y_m, z_m};
-         each a value, {min, max} or {near, within}
+         each a value, {min, max} or {near, within};
+         verdict: good, or all its faults, such as [SLID_DOWN]
 
 Each has `session`, a name within the case, needed only where there are several;
 run takes a list of them. A step may be a loop: {for: {...}, steps: [...]}.

@@ -1,8 +1,12 @@
 #include "client/figures/dress_form.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "client/problem.h"
 
 namespace weft::client {
 namespace {
@@ -402,6 +406,32 @@ Measures measures_of_size(FigureKind figure, int size) {
   measures.waist = female ? 0.02 * size - 0.04 : 0.02 * size - 0.12;
   measures.hip = female ? 0.015 * size + 0.4 : 0.02 * size + 0.04;
   return measures;
+}
+
+Measures measures_of(const Person& person) {
+  Measures measures = person.measures;
+  if (!person.size) return measures;
+  const bool female = measures.figure == FigureKind::kFemale;
+  const int least = female ? kLeastFemaleSize : kLeastMaleSize,
+            most = female ? kMostFemaleSize : kMostMaleSize;
+  if (*person.size < least || *person.size > most || *person.size % 2 != 0)
+    throw Violation{"size", fmt::format("{} is not even and within {} to {}, sizes of a {}",
+                                        *person.size, least, most, female ? "woman" : "man")};
+  const Measures usual = measures_of_size(measures.figure, *person.size);
+  for (const auto girth : {&Measures::bust, &Measures::waist, &Measures::hip})
+    if (!(measures.*girth)) measures.*girth = usual.*girth;
+  return measures;
+}
+
+std::span<const LengthInfo> person_lengths() {
+  static constexpr LengthInfo kLengths[] = {
+      {"stature", &Measures::stature, "Height of the person, m", 1.2, 2.2},
+      {"bust", &Measures::bust, "Bust or chest girth, m", 0.6, 1.8},
+      {"underbust", &Measures::underbust, "Underbust girth, m", 0.5, 1.7},
+      {"waist", &Measures::waist, "Waist girth, m", 0.45, 1.8},
+      {"top_hip", &Measures::top_hip, "Top hip girth, m", 0.55, 1.8},
+      {"hip", &Measures::hip, "Hip girth, m", 0.6, 1.9}};
+  return kLengths;
 }
 
 const DressForm::Girth& DressForm::girth(const std::string& name) const {

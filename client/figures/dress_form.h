@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,24 @@ inline constexpr int kLeastMaleSize = 42, kMostMaleSize = 62;
 // A person of that size, even and within those of the figure: 40 of a woman has 0.92, 0.76 and
 // 1.00 m, 50 of a man 1.00, 0.88 and 1.04 m, as German shops count.
 Measures measures_of_size(FigureKind figure, int size);
+
+// Whom a body or a garment is for.
+struct Person {
+  Measures measures{};
+  std::optional<int> size{};  // gives the girths that are not given
+};
+// Throws Violation: no such size.
+Measures measures_of(const Person& person);
+
+// A length that a person may have.
+struct LengthInfo {
+  const char* name;  // "top_hip"
+  std::optional<double> Measures::*value;
+  const char* description;
+  double least, most;  // m
+};
+std::span<const LengthInfo> person_lengths();
+inline constexpr double kMostArmAngle = 70;  // degrees
 
 // A standing figure with its feet at y = 0 that looks along z, without face, fingers or toes.
 struct DressForm {

@@ -26,7 +26,7 @@ v1::BuildGarmentResponse build(Connection& connection, const GarmentOrder& order
   } catch (const Problem& problem) {
     const auto in_file = [&](std::string field) {
       if (field.starts_with(kPrefix)) field.erase(0, kPrefix.size());
-      return field == "edge_m" ? std::string("--edge") : field;
+      return field == "edge_m" ? order.edge_field : field;
     };
     Problem placed(problem.exit, problem.code, problem.reason, in_file(problem.what()));
     for (const auto& [field, description] : problem.violations)

@@ -19,6 +19,7 @@ struct GarmentOrder {
   std::optional<double> edge_m{};
   std::vector<v1::Collider> bodies{};
   std::optional<double> deflate_m{};  // of bodies, while seams close
+  std::string edge_field = "--edge";  // what errors call edge_m
 };
 
 struct GarmentScene {

@@ -452,12 +452,17 @@ struct Template {
 };
 const std::vector<Template>& all_templates() {
   static const std::vector<Template> all = {
-      {{"tshirt", "A T-shirt: front, back, sleeves of two halves"}, tshirt},
-      {{"skirt", "A skirt to the knee: front and back with darts, a waistband"}, skirt},
-      {{"trousers", "Trousers to the ankle: legs of a front and a back, a waistband", 0.02},
+      {{"tshirt", "A T-shirt: front, back, sleeves of two halves", kUsualTextile}, tshirt},
+      {{"skirt", "A skirt to the knee: front and back with darts, a waistband", "denim_11oz"},
+       skirt},
+      {{"trousers", "Trousers to the ankle: legs of a front and a back, a waistband", kUsualTextile,
+        0.02},
        trousers},
-      {{"dress", "A dress to the knee: a fitted top with sleeves, a gathered skirt"}, dress},
-      {{"shirt", "A loose shirt with long sleeves and a stand-up collar, without an opening"},
+      {{"dress", "A dress to the knee: a fitted top with sleeves, a gathered skirt",
+        "wool_tropical"},
+       dress},
+      {{"shirt", "A loose shirt with long sleeves and a stand-up collar, without an opening",
+        kUsualTextile},
        shirt},
   };
   return all;

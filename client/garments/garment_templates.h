@@ -8,9 +8,13 @@
 
 namespace weft::client {
 
+// Of T-shirts, and of patterns that nothing is known about.
+inline constexpr const char* kUsualTextile = "jersey_interlock";
+
 struct GarmentInfo {
   std::string name;
   std::string description;
+  std::string textile;   // that it is usually made of
   double deflate_m = 0;  // by which bodies want to be smaller while it is put on
 };
 std::vector<GarmentInfo> garment_templates();

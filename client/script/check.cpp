@@ -8,6 +8,7 @@
 #include <set>
 #include <tuple>
 
+#include "client/assets.h"
 #include "client/scene_file.h"
 
 namespace weft::client {
@@ -43,23 +44,38 @@ class Checker {
   // What the server would make of the scene; each is asked about once.
   std::optional<v1::Session> ask(const Step& step, const std::string& session,
                                  const v1::Scene& scene) {
-    const std::string key = scene.SerializeAsString();
+    const std::string key = asset_name(scene.SerializeAsString());
     if (const auto known = asked_.find(key); known != asked_.end()) return known->second;
     v1::CreateSessionRequest request;
     request.set_validate_only(true);
+    std::optional<v1::Session>& answer = asked_[key];
+    note_refusals(step, session, [&] { answer = create_session(connection_, scene, request); });
+    return answer;
+  }
+
+  // What a server refuses is a fault of the session's.
+  template <class Work>
+  void note_refusals(const Step& step, const std::string& session, const Work& work) {
     try {
-      return asked_[key] = create_session(connection_, scene, request);
+      work();
     } catch (const Problem& problem) {
-      if (problem.exit != Exit::kRefused) throw;
+      if (problem.exit == Exit::kNoConnection || problem.exit == Exit::kInterrupted) throw;
       if (problem.violations.empty()) fault(step, "", session + ": " + problem.what());
       for (const auto& [field, description] : problem.violations)
         fault(step, fmt::format(": {} of {}", field, session), description);
-      return asked_[key] = std::nullopt;
     }
   }
 
   void check_step(const Step& step, const CreateStep& what) {
-    sessions_[what.session] = {.session = ask(step, what.session, what.scene)};
+    const auto scene = what.drape ? make(step, what.session, *what.drape) : what.scene;
+    sessions_[what.session] = {.session = scene ? ask(step, what.session, *scene) : std::nullopt};
+  }
+
+  // What the server makes of the pattern.
+  std::optional<v1::Scene> make(const Step& step, const std::string& session, const Drape& drape) {
+    std::optional<v1::Scene> scene;
+    note_refusals(step, session, [&] { scene = make_drape(connection_, drape).scene; });
+    return scene;
   }
 
   void check_step(const Step& step, const SnapshotStep& what) {

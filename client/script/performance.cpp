@@ -1,7 +1,9 @@
 #include "client/script/performance.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -44,7 +46,7 @@ double position(const Sight& sight, const Expectation& expectation) {
 }
 
 // NaN where there is none: the time of rest of a sheet in motion, cuts where they are not counted.
-double value_of(const Sight& sight, const Expectation& expectation) {
+double value_of(const Sight& sight, const v1::Verdict& verdict, const Expectation& expectation) {
   const v1::FrameStats& stats = sight.frame.stats();
   switch (expectation.quantity) {
     case Quantity::kFrame:
@@ -70,8 +72,35 @@ double value_of(const Sight& sight, const Expectation& expectation) {
       return stats.kinetic_energy_j() + stats.potential_energy_j();
     case Quantity::kPosition:
       return position(sight, expectation);
+    case Quantity::kStrainWarp:
+      return verdict.strain_warp();
+    case Quantity::kStrainWeft:
+      return verdict.strain_weft();
+    case Quantity::kPressure:
+      return verdict.largest_pressure_pa();
+    case Quantity::kSlid:
+      return verdict.slid_m();
   }
   return std::numeric_limits<double>::quiet_NaN();
+}
+
+bool needs_verdict(const ExpectStep& step) {
+  return step.faults || std::ranges::any_of(step.expectations, [](const Expectation& each) {
+           return each.quantity >= Quantity::kStrainWarp;
+         });
+}
+
+Finding finding_of(const Step& step, const std::set<std::string>& wanted,
+                   const v1::Verdict& verdict) {
+  VerdictFinding found{.faults = {}, .wanted = wanted, .text = {}};
+  for (const v1::Fault& fault : verdict.faults()) {
+    found.faults.insert(fault.code());
+    found.text += (found.text.empty() ? "" : "; ") + fault.code() + ": " + fault.message();
+  }
+  return {.line = step.line,
+          .name = "verdict",
+          .passed = found.faults == wanted,
+          .verdict = std::move(found)};
 }
 
 class Performer {
@@ -131,7 +160,9 @@ class Performer {
   }
 
   void do_step(const Step&, const CreateStep& what) {
-    observe(what.session, create_session(connection_, what.scene));
+    observe(what.session,
+            what.drape ? create_session(connection_, make_drape(connection_, *what.drape).scene)
+                       : create_session(connection_, what.scene));
   }
 
   void do_step(const Step&, const SnapshotStep& what) {
@@ -214,17 +245,27 @@ class Performer {
   void do_step(const Step& step, const ExpectStep& what) {
     const Actor& actor = actors_.at(what.session);
     const Sight sight = catch_up(actor);
+    v1::Verdict verdict;
+    if (needs_verdict(what)) {
+      v1::GetVerdictRequest request;
+      request.set_name(actor.session.name());
+      verdict = connection_.call(&Sessions::GetVerdict, request);
+    }
     for (const Expectation& expectation : what.expectations) {
       Finding finding{.line = step.line,
                       .name = expectation.name,
-                      .value = value_of(sight, expectation),
+                      .value = value_of(sight, verdict, expectation),
                       .low = expectation.low,
                       .high = expectation.high};
       finding.passed = finding.value >= finding.low && finding.value <= finding.high;
-      if (!finding.passed)
-        result_.failures.push_back({step.line, step.kind, finding_text(finding)});
-      result_.findings.push_back(finding);
+      note(step, std::move(finding));
     }
+    if (what.faults) note(step, finding_of(step, *what.faults, verdict));
+  }
+
+  void note(const Step& step, Finding finding) {
+    if (!finding.passed) result_.failures.push_back({step.line, step.kind, finding_text(finding)});
+    result_.findings.push_back(std::move(finding));
   }
 
   // Waits for the frame that the session is at now.
@@ -278,6 +319,11 @@ CaseResult perform(Connection& connection, const Case& performed, bool replace,
 }
 
 std::string finding_text(const Finding& finding) {
+  if (finding.verdict) {
+    const auto& [faults, wanted, text] = *finding.verdict;
+    return fmt::format("verdict is {}, not {}", faults.empty() ? "good" : text,
+                       wanted.empty() ? "good" : fmt::format("{}", fmt::join(wanted, ", ")));
+  }
   if (finding.name == "at_rest") return finding.value > 0 ? "is at rest" : "is not at rest";
   if (std::isnan(finding.value)) return fmt::format("{}: there is none", finding.name);
   const std::string head = fmt::format("{} is {:.6g}", finding.name, finding.value);

@@ -2,6 +2,8 @@
 
 #include <chrono>
 #include <functional>
+#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -9,6 +11,12 @@
 #include "client/script/script.h"
 
 namespace weft::client {
+
+// A verdict's faults, by their codes.
+struct VerdictFinding {
+  std::set<std::string> faults, wanted;
+  std::string text;  // their sentences
+};
 
 // What an expectation found.
 struct Finding {
@@ -18,6 +26,7 @@ struct Finding {
   double low = 0;
   double high = 0;
   bool passed = false;
+  std::optional<VerdictFinding> verdict{};  // instead of values
 };
 
 struct Failure {

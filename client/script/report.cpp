@@ -50,6 +50,14 @@ Json report_json(const Script& script, const std::vector<CaseResult>& results) {
     for (const auto& [name, value] : script.cases[i].values) values[name] = value;
     Json findings = Json::array();
     for (const Finding& finding : result.findings) {
+      if (finding.verdict) {
+        findings.push_back({{"line", finding.line},
+                            {"quantity", finding.name},
+                            {"faults", finding.verdict->faults},
+                            {"wanted", finding.verdict->wanted},
+                            {"passed", finding.passed}});
+        continue;
+      }
       findings.push_back({{"line", finding.line},
                           {"quantity", finding.name},
                           {"value", bound(finding.value)},

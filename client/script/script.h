@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "client/garments/drape.h"
 #include "client/problem.h"
 #include "client/scene_action.h"
 #include "client/textile_change.h"
@@ -21,6 +23,7 @@ namespace weft::client {
 struct CreateStep {
   std::string session;
   v1::Scene scene;
+  std::optional<Drape> drape{};  // what a server makes the scene of, instead
 };
 
 struct SetStep {
@@ -82,6 +85,10 @@ enum class Quantity {
   kPotentialEnergy,
   kEnergy,
   kPosition,
+  kStrainWarp,  // of a verdict, from here on
+  kStrainWeft,
+  kPressure,
+  kSlid,
 };
 
 // What a quantity shall be: within [low, high].
@@ -97,6 +104,7 @@ struct Expectation {
 struct ExpectStep {
   std::string session;
   std::vector<Expectation> expectations;
+  std::optional<std::set<std::string>> faults{};  // all of the verdict; none: it is good
 };
 
 struct Step {

@@ -214,15 +214,70 @@ class ScriptReader {
     step.session = new_name(fields, "session", sessions_, "cloth");
 
     const TemplateOptions options = read_template_options(fields);
+    Drape drape = read_drape(fields, options);
     const auto name = fields.text("template");
     const auto file = fields.text("scene");
     const YAML::Node changes = fields.node("fields");
-    if (fields.has("template") == fields.has("scene"))
-      fields.fault("", "give either template or scene");
+    if (fields.has("template") + fields.has("scene") + fields.has("drape") != 1)
+      fields.fault("", "give one of template, scene and drape");
     if (name) try_to(fields, "template", [&] { step.scene = make_template(*name, options); });
     if (file) try_to(fields, "scene", [&] { step.scene = read_scene(from_here(*file)); });
-    if (fields.has("fields")) change_scene(changes, scope, step.scene);
+    if (fields.has("fields") && fields.has("drape"))
+      drape.values = read_values(changes, scope);
+    else if (fields.has("fields"))
+      change_scene(changes, scope, step.scene);
+    if (fields.has("drape")) step.drape = std::move(drape);
     return step;
+  }
+
+  // What is for one kind of scene alone.
+  static void only_for(const char* kind, std::initializer_list<const char*> keys, Fields& fields) {
+    for (const char* key : keys)
+      if (fields.has(key) && !fields.has(kind)) fields.fault(key, std::string("is for a ") + kind);
+  }
+
+  // Its files are read here to find what is wrong with them.
+  Drape read_drape(Fields& fields, const TemplateOptions& options) const {
+    Drape drape{.measures = read_measures(fields),
+                .textile = options.textile,
+                .edge_m = fields.number("edge_m", 0.002, 0.1),
+                .deflate_m = fields.number("deflate_m", 0, 0.1),
+                .accuracy = options.accuracy,
+                .edge_field = "edge_m"};
+    if (const auto garment = fields.text("drape")) {
+      drape.garment = is_garment_template(*garment) ? *garment : from_here(*garment);
+      if (!is_garment_template(*garment))
+        try_to(fields, "drape", [&] { read_garment(drape.garment); });
+    }
+    for (const std::string& file : fields.texts("body")) {
+      drape.bodies.push_back(from_here(file));
+      try_to(fields, "body", [&] { garment_body(drape.bodies.back()); });
+    }
+    only_for("drape", {"edge_m", "deflate_m", "body"}, fields);
+    return drape;
+  }
+
+  static Measures read_measures(Fields& fields) {
+    constexpr std::array kFigures{std::pair{"female", FigureKind::kFemale},
+                                  std::pair{"male", FigureKind::kMale}};
+    Person person;
+    Measures& measures = person.measures;
+    measures.figure = read_choice("figure", kFigures, fields).value_or(measures.figure);
+    if (const auto size = fields.whole_number("size", 0, 1000))
+      person.size = static_cast<int>(*size);
+    for (const LengthInfo& each : person_lengths()) {
+      const std::string key = std::string(each.name) + "_m";
+      measures.*each.value = fields.number(key, each.least, each.most);
+      only_for("drape", {key.c_str()}, fields);
+    }
+    measures.arm_angle = fields.number("arm_angle", 0, kMostArmAngle).value_or(measures.arm_angle);
+    only_for("drape", {"figure", "size", "arm_angle"}, fields);
+    try {
+      return measures_of(person);
+    } catch (const Violation& violation) {
+      fields.fault(violation.field, violation.description);
+      return measures;
+    }
   }
 
   // What goes wrong with it is a fault of the field.
@@ -282,27 +337,29 @@ class ScriptReader {
     options.optimal_breakpoints = fields.flag("optimal_breakpoints").value_or(false);
     options.evaluator = read_choice("evaluator", kEvaluators, fields);
     options.accuracy = read_choice("accuracy", kAccuracies, fields);
-    if (fields.has("scene")) {
-      for (const char* key : {"rows", "columns", "spacing_m", "textile", "bend", "segments",
-                              "fold_clamp", "optimal_breakpoints", "evaluator", "accuracy"}) {
-        if (fields.has(key)) fields.fault(key, "is for a template; use fields with a scene");
-      }
-    }
+    only_for("template",
+             {"rows", "columns", "spacing_m", "bend", "segments", "fold_clamp",
+              "optimal_breakpoints", "evaluator"},
+             fields);
+    if (fields.has("scene"))
+      for (const char* key : {"textile", "accuracy"})
+        if (fields.has(key)) fields.fault(key, "is for a template or a drape; use fields");
     return options;
   }
 
   // Values by their place in the scene file: "sheets[0].grid.rows: 9".
-  void change_scene(const YAML::Node& node, Scope& scope, v1::Scene& scene) {
+  static Values read_values(const YAML::Node& node, Scope& scope) {
     Fields fields(node, "create.fields", scope);
-    for (const std::string& key : fields.keys()) {
-      const auto value = fields.text(key);
-      if (!value) continue;
-      try {
-        set_field(scene, key, *value);
-      } catch (const Problem& problem) {
-        fields.fault(key, problem.what());
-      }
-    }
+    Values values;
+    for (const std::string& key : fields.keys())
+      if (const auto value = fields.text(key)) values.emplace_back(key, *value);
+    return values;
+  }
+
+  static void change_scene(const YAML::Node& node, Scope& scope, v1::Scene& scene) {
+    Fields fields(node, "create.fields", scope);
+    for (const auto& each : read_values(node, scope))
+      try_to(fields, each.first, [&] { set_field(scene, each.first, each.second); });
   }
 
   What read_set(Fields& fields, Scope& scope) {
@@ -430,7 +487,11 @@ class ScriptReader {
                                      std::pair{"cloth_cuts", Quantity::kCuts},
                                      std::pair{"kinetic_energy_j", Quantity::kKineticEnergy},
                                      std::pair{"potential_energy_j", Quantity::kPotentialEnergy},
-                                     std::pair{"energy_j", Quantity::kEnergy}};
+                                     std::pair{"energy_j", Quantity::kEnergy},
+                                     std::pair{"strain_warp", Quantity::kStrainWarp},
+                                     std::pair{"strain_weft", Quantity::kStrainWeft},
+                                     std::pair{"pressure_pa", Quantity::kPressure},
+                                     std::pair{"slid_m", Quantity::kSlid}};
     ExpectStep step;
     step.session = read_session(fields);
     if (const auto rest = fields.flag("at_rest")) {
@@ -442,6 +503,7 @@ class ScriptReader {
       Expectation expectation{.quantity = quantity, .name = name};
       if (read_band(fields, name, scope, expectation)) step.expectations.push_back(expectation);
     }
+    step.faults = read_verdict(fields);
     const YAML::Node particle = fields.node("particle");
     if (fields.has("particle")) {
       Fields place(particle, "expect.particle", scope);
@@ -458,9 +520,24 @@ class ScriptReader {
       if (!any) place.fault("", "give x_m, y_m or z_m");
       place.end();
     }
-    if (step.expectations.empty() && !fields.has("particle"))
+    if (step.expectations.empty() && !fields.has("particle") && !fields.has("verdict"))
       fields.fault("", "says nothing that is expected");
     return step;
+  }
+
+  // "good", or all the faults that a verdict shall have.
+  static std::optional<std::set<std::string>> read_verdict(Fields& fields) {
+    static const std::set<std::string> kFaults{"CLOTH_CUTS",  "INSIDE_BODY", "NOT_AT_REST",
+                                               "NOT_DRESSED", "SLID_DOWN",   "TOO_TIGHT"};
+    const std::vector<std::string> wanted = fields.texts("verdict");
+    if (!fields.has("verdict")) return std::nullopt;
+    if (wanted.empty()) fields.fault("verdict", "give good, or faults");
+    if (wanted == std::vector<std::string>{"good"}) return std::set<std::string>{};
+    for (const std::string& code : wanted)
+      if (!kFaults.contains(code))
+        fields.fault("verdict", fmt::format("\"{}\" is not good, alone, nor one of {}", code,
+                                            fmt::join(kFaults, ", ")));
+    return std::set(wanted.begin(), wanted.end());
   }
 
   // A number, or {min, max}, or {near, within}.

@@ -1,6 +1,7 @@
 #include "core/cloth_contact/tangles.h"
 
 #include <algorithm>
+#include <array>
 #include <span>
 
 #include "core/cloth_contact/cuts.h"
@@ -12,9 +13,25 @@ namespace {
 
 constexpr std::size_t kMostTold = 3;
 
+// Of the first triangle that has these corners; none where there are no two panels.
+const Panel* panel_of(const SheetShape& shape, std::span<const int> corners) {
+  const auto* mesh = std::get_if<Triangles>(&shape);
+  if (mesh == nullptr || (*mesh)->panels.size() < 2) return nullptr;
+  const auto has_all = [&](const std::array<int, 3>& triangle) {
+    return std::ranges::all_of(
+        corners, [&](int i) { return std::ranges::find(triangle, i) != triangle.end(); });
+  };
+  auto left = std::ranges::find_if((*mesh)->triangles, has_all) - (*mesh)->triangles.begin();
+  for (const Panel& panel : (*mesh)->panels)
+    if ((left -= panel.triangles) < 0) return &panel;
+  return nullptr;
+}
+
 std::string name_particles(const Scene& scene, std::size_t sheet, std::span<const int> particles) {
   std::string text = join(scene.sheets[sheet].name, " ");
   for (std::size_t k = 0; k < particles.size(); ++k) text += join(k == 0 ? "" : "-", particles[k]);
+  if (const Panel* panel = panel_of(scene.sheets[sheet].shape, particles))
+    text += " of panel " + panel->name;
   return text;
 }
 

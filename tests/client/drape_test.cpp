@@ -13,6 +13,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double kPole = 0.1;  // radius of what is dressed, m
 
@@ -117,6 +118,61 @@ TEST_F(Drape, SaysWhatIsWrongWithItsStart) {
   EXPECT_THAT(outcome.out, HasSubstr("start     STARTS_INSIDE: "));
   EXPECT_THAT(drape(0.62, {"--seconds", "0.1", "--deflate", "0.2"}).err,
               HasSubstr("dressing.deflate_m: 0.2 m is not within 0 to 0.1 m"));
+}
+
+TEST_F(Drape, OfAScriptIsThatOfTheCommandAndHeldToItsVerdict) {
+  ASSERT_EQ(drape(0.62, {"--recording", path("command.weft")}).exit, 0);
+  write_file(path("wide.json"), client::pattern_text(tube_pattern(0.8)));
+  write_file(path("tubes.yaml"), R"(
+for: {tube: [tube, wide]}
+parallel: 2
+steps:
+  - create: {drape: $tube.json, body: pole.obj, edge_m: 0.03, fields: {cloth_contact: true}}
+  - record: {file: $tube.weft}
+  - run: {until_rest: true, until_time_s: 3}
+  - expect: {verdict: good, slid_m: {max: 0.01}, pressure_pa: {min: 1}}
+)");
+  const Outcome outcome = run_weft({"script", path("tubes.yaml"), "--embedded"});
+  EXPECT_EQ(outcome.exit, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("1 of 2 cases failed"));
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("tube wide: "), HasSubstr("line 8: expect: verdict is "),
+                    HasSubstr("SLID_DOWN: "), HasSubstr(", not good"),
+                    HasSubstr("line 8: expect: slid_m is "), Not(HasSubstr("tube tube: "))));
+  EXPECT_THAT(run_weft({"diff", path("command.weft"), path("tube.weft")}).out,
+              HasSubstr("largest    0 m\n"));  // the command's has pressures too
+}
+
+TEST_F(Drape, OfAScriptIsCheckedBeforeItRuns) {
+  const auto refusal = [&](const std::string& steps) {
+    write_file(path("tubes.yaml"), "steps:\n" + steps);
+    return run_weft({"script", path("tubes.yaml"), "--embedded", "--dry-run"}).err;
+  };
+  v1::Pattern torn = tube_pattern(0.62);
+  torn.mutable_seams(0)->mutable_first_side(0)->set_panel("sleeve");
+  write_file(path("torn.json"), client::pattern_text(torn));
+  write_file(path("tube.json"), client::pattern_text(tube_pattern(0.62)));
+  write_file(path("pole.obj"), pole_obj());
+  EXPECT_THAT(refusal(R"(  - create: {session: a, drape: gown, edge_m: 1, body: none.obj}
+  - create: {session: b, drape: tshirt, size: 41, waist_m: 9, rows: 3}
+  - create: {session: c, template: hang, deflate_m: 0.01}
+  - expect: {session: c, verdict: [SLID]}
+  - expect: {session: c, verdict: []}
+)"),
+              AllOf(HasSubstr("line 2: create.drape "), HasSubstr("one of tshirt, "),
+                    HasSubstr("line 2: create.edge_m     1 is not within 0.002 to 0.1"),
+                    HasSubstr("line 2: create.body "), HasSubstr("line 3: create.size "),
+                    HasSubstr("within 32 to 54, sizes of a woman"),
+                    HasSubstr("line 3: create.waist_m    9 is not within 0.45 to 1.8"),
+                    HasSubstr("line 3: create.rows       is for a template"),
+                    HasSubstr("line 4: create.deflate_m  is for a drape"),
+                    HasSubstr("line 5: expect.verdict    \"SLID\" is not good"),
+                    HasSubstr("line 6: expect.verdict    give good, or faults")));
+  EXPECT_THAT(refusal(R"(  - create: {session: a, drape: torn.json, body: pole.obj, edge_m: 0.03}
+  - create: {session: b, drape: tube.json, body: pole.obj, fields: {"sheets[0].skin_m": -3}}
+)"),
+              AllOf(HasSubstr("line 2: create: seams[0].first_side[0].panel of a "),
+                    HasSubstr("\"sleeve\""), HasSubstr("line 3: create: sheets[0].skin_m of b")));
 }
 
 TEST_F(Drape, ReplacesAFileOnlyWhenAsked) {

@@ -308,8 +308,9 @@ TEST_P(GarmentTemplates, StartOutsideTheBodyUntangledAndSymmetric) {
   for (const auto& info : client::garment_templates()) {
     SCOPED_TRACE(info.name);
     write_file(pattern, client::pattern_text(client::make_garment(info.name, form)));
-    const Outcome built = run_weft({"--json", "garment", "build", pattern, "--edge", "0.02",
-                                    "--body", body, "-o", scene, "--force"});
+    const Outcome built =
+        run_weft({"--json", "garment", "build", pattern, "--edge", "0.02", "--body", body,
+                  "--textile", info.textile, "-o", scene, "--force"});
     ASSERT_EQ(built.exit, 0) << built.err;
     EXPECT_GT(built.json()["least_height"].get<double>(), 0.35);
     const Outcome checked = run_weft({"scene", "check", scene});

@@ -309,6 +309,23 @@ TEST(Dressing, HeldParticlesKeepTheirHeightUntilTheyAreLetGo) {
   for (const int i : band) EXPECT_LT(x(1, i), start(1, i) - 0.1);
 }
 
+TEST(Dressing, AStartInsideAColliderIsToldByPanel) {
+  constexpr double kRadius = 0.09;
+  const Simulation simulation(around_pole(kRadius));
+  const Matrix3Xd start = positions(simulation);
+  int front = 0, back = 0;  // seams count with the first panel
+  for (const auto& x : start.colwise())
+    if (std::hypot(x.x(), x.z()) < kRadius) ++(x.z() < 0 ? back : front);
+  ASSERT_GT(back, 0);
+  const auto& warnings = simulation.plan().warnings;
+  const auto told = std::ranges::find(warnings, "STARTS_INSIDE", &Warning::code);
+  ASSERT_NE(told, warnings.end());
+  EXPECT_NE(told->message.find("; " + std::to_string(front) + " in panel front, " +
+                               std::to_string(back) + " in panel back: "),
+            std::string::npos)
+      << told->message;
+}
+
 TEST(Dressing, CollidersAreSmallerWhileSeamsClose) {
   Scene scene = around_pole(0.09);  // the panels start within it
   scene.dressing->deflate = 0.02;

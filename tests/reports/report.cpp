@@ -67,14 +67,14 @@ std::string number(double value) { return fmt::format("{:.4g}", value); }
 int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
   const std::map<std::string, decltype(&weft::reports::accuracy)> pages = {
-      {"accuracy", weft::reports::accuracy}, {"contact", weft::reports::contact},
-      {"mesh", weft::reports::mesh},         {"stability", weft::reports::stability},
-      {"rest", weft::reports::rest},         {"speed", weft::reports::speed},
-      {"tethers", weft::reports::tethers}};
+      {"accuracy", weft::reports::accuracy},   {"contact", weft::reports::contact},
+      {"garments", weft::reports::garments},   {"mesh", weft::reports::mesh},
+      {"stability", weft::reports::stability}, {"rest", weft::reports::rest},
+      {"speed", weft::reports::speed},         {"tethers", weft::reports::tethers}};
   if (arguments.size() < 3 || !pages.contains(arguments[0])) {
     std::cerr
-        << "usage: weft-report accuracy|contact|mesh|rest|stability|speed|tethers FOLDER COMMIT "
-           "[--large]\n";
+        << "usage: weft-report accuracy|contact|garments|mesh|rest|stability|speed|tethers FOLDER "
+           "COMMIT [--large]\n";
     return 2;
   }
   const bool large = arguments.size() > 3 && arguments[3] == "--large";

@@ -38,6 +38,7 @@ std::string number(double value);
 void accuracy(const std::filesystem::path& folder, const std::string& commit, bool large);
 void stability(const std::filesystem::path& folder, const std::string& commit, bool large);
 void contact(const std::filesystem::path& folder, const std::string& commit, bool large);
+void garments(const std::filesystem::path& folder, const std::string& commit, bool large);
 void mesh(const std::filesystem::path& folder, const std::string& commit, bool large);
 void rest(const std::filesystem::path& folder, const std::string& commit, bool large);
 void tethers(const std::filesystem::path& folder, const std::string& commit, bool large);

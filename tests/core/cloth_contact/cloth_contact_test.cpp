@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <regex>
 #include <string>
 #include <utility>
 
@@ -370,6 +372,22 @@ TEST(ClothContact, IsAskedForAndThenNotWarnedOf) {
   EXPECT_EQ(codes(), std::vector<std::string>{});
   scene.sheets[1].origin.y() = 0.001;
   EXPECT_EQ(codes(), std::vector<std::string>{"TANGLED_START"});
+  // of panels, those of the first triangle of what is named
+  TriangleMesh mesh = *std::get<Triangles>(scene.sheets[1].shape);
+  const int half = static_cast<int>(mesh.triangles.size()) / 2;
+  mesh.panels = {{"left", half, 0}, {"right", half, 0}};
+  scene.sheets[1].shape = complete(mesh);
+  std::swap(scene.sheets[0], scene.sheets[1]);  // what is told is of the first
+  const Simulation simulation(scene);
+  const std::string& told =
+      std::ranges::find(simulation.plan().warnings, "TANGLED_START", &Warning::code)->message;
+  std::smatch named;
+  ASSERT_TRUE(std::regex_search(told, named, std::regex("triangles ([0-9]+) of panel (\\w+)")))
+      << told;
+  const auto first = std::ranges::find_if(mesh.triangles, [&](const auto& triangle) {
+    return std::ranges::find(triangle, std::stoi(named[1])) != triangle.end();
+  });
+  EXPECT_EQ(named[2], first - mesh.triangles.begin() < half ? "left" : "right");
   scene.cloth_contact = false;
   EXPECT_EQ(codes(), (std::vector<std::string>{"NO_SELF_COLLISION", "NO_SHEET_SHEET_COLLISION"}));
 }

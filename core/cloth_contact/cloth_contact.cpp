@@ -24,6 +24,10 @@ ClothContact::ClothContact(const Scene& scene, const LeftOut& left_out)
   forget();
 }
 
+int ClothContact::most_steps(double dt) {
+  return std::max(1, static_cast<int>(std::min(kWindowTime / dt, 1e6)));
+}
+
 void ClothContact::forget() {
   lists_.forget();
   all_ = {};
@@ -51,7 +55,7 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
   const bool is_known = window_.is_known;
   // the begin of a window of one step told where it ends, unless pairs are led apart meanwhile
   const bool is_read = window_.steps == 1 && untangling_.empty();
-  window_ = {.most_steps = ends_frame ? 1 : std::max(1, static_cast<int>(kWindowTime / dt))};
+  window_ = {.most_steps = ends_frame ? 1 : most_steps(dt)};
   untangling_.lead(sheets, dt);
   if (is_known) {
     if (!is_read) read(sheets);

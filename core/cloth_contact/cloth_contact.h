@@ -24,6 +24,9 @@ class ClothContact {
   // Holds on to the scene.
   explicit ClothContact(const Scene& scene, const LeftOut& left_out = {});
 
+  // After how many steps of dt (s) it acts, at most.
+  static int most_steps(double dt);
+
   // Sheets may be anywhere now, or be held otherwise, at the begin of a frame. Nothing that was
   // found before is used, nor kept in memory.
   void forget();

@@ -1,7 +1,9 @@
 #include "core/cloth_contact/cloth_contact.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -381,6 +383,23 @@ TEST(ClothContact, CutsOfAFrameAreAmongItsFacts) {
   EXPECT_EQ(Simulation(scene).stats().cloth_cuts, 0);
   scene.cloth_contact = false;
   EXPECT_EQ(Simulation(scene).stats().cloth_cuts, std::nullopt);
+}
+
+TEST(ClothContact, IsNamedInThePlanWithWhatItCostsOrWhyItIsSkipped) {
+  Scene scene = touching({lattice(5, 4)});
+  std::get<MeasuredTextile>(scene.sheets[0].textile.model).tensile_warp = 1e4;
+  const Plan plan = Simulation(scene).plan();
+  const auto steps = static_cast<int>(2.5e-4 / plan.step.substep);
+  ASSERT_GT(steps, 1);
+  const std::string line = "lattice: cloth contact at 0.002 m, 24 triangles, every " +
+                           std::to_string(steps) + " substeps or fewer";
+  EXPECT_THAT(plan.passes, ::testing::Contains(line));
+  scene.cloth_contact = false;
+  const Plan without = Simulation(scene).plan();
+  EXPECT_TRUE(
+      std::any_of(without.skipped.begin(), without.skipped.end(), [](const SkippedPass& skipped) {
+        return skipped.pass == "cloth contact" && skipped.reason == "cloth_contact is not set";
+      }));
 }
 
 TEST(ClothContact, ThicknessIsBoundedByTheMesh) {

@@ -7,7 +7,9 @@
 #include <optional>
 #include <span>
 
+#include "core/cloth_contact/cloth_contact.h"
 #include "core/contact/contact.h"
+#include "core/contact/moving_bodies.h"
 #include "core/model/self_weight.h"
 #include "core/model/text.h"
 #include "core/motion/stability.h"
@@ -162,10 +164,28 @@ void describe_forces(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan)
     plan.skipped.push_back({join(sheet.name, ": drag"), "the textile has no air drag"});
 }
 
+// Precondition: the step is planned.
 void describe_cloth_contact(const Scene& scene, Plan& plan) {
+  if (!scene.cloth_contact) {
+    plan.skipped.push_back({"cloth contact", "cloth_contact is not set"});
+    return;
+  }
+  const int steps = ClothContact::most_steps(plan.step.substep);
   for (const SheetDefinition& sheet : scene.sheets)
     plan.passes.push_back(join(sheet.name, ": cloth contact at ", sheet.thickness_or_default(),
-                               " m, ", triangle_count(sheet.shape), " triangles"));
+                               " m, ", triangle_count(sheet.shape), " triangles, every ",
+                               steps == 1 ? "substep" : join(steps, " substeps or fewer")));
+}
+
+void describe_poses(const Scene& scene, Plan& plan) {
+  for (const Collider& collider : scene.colliders) {
+    if (!collider.poses) continue;
+    const Body& body = *std::get<SharedBody>(collider.shape);
+    plan.passes.push_back(join(collider.name, ": ", collider.poses->times.size(), " poses, ",
+                               count_grids(*collider.poses, body.grid.cell), " grids of ",
+                               body.mesh.triangles.size(), " triangles, cells of ", body.grid.cell,
+                               " m"));
+  }
 }
 
 // B and c_b along warp and weft, N m and N/m, and the weight of an area, Pa.
@@ -468,7 +488,8 @@ Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
   };
   pass("wind", scene.environment.wind.has_value(), "the scene has none");
   pass("contact", !scene.colliders.empty(), "the scene has no collider");
-  if (scene.cloth_contact) describe_cloth_contact(scene, plan);
+  describe_poses(scene, plan);
+  describe_cloth_contact(scene, plan);
   warn(scene, sheets, steps, plan);
   return plan;
 }

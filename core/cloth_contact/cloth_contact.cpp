@@ -15,6 +15,7 @@ constexpr double kMotionRounding = 1.001;  // of motion as solvers tell it
 constexpr double kWindowTime = 2.5e-4;
 // of the thickest cloth: what comes in a window at most, and what is not looked at closer
 constexpr double kWindowReach = 0.5, kLeastReach = 0.02;
+constexpr double kSpare = 1.25;  // where steps are faster than the ones before
 
 }  // namespace
 
@@ -23,12 +24,18 @@ ClothContact::ClothContact(const Scene& scene, const LeftOut& left_out)
   forget();
 }
 
+int ClothContact::most_steps(double dt) {
+  return std::max(1, static_cast<int>(std::min(kWindowTime / dt, 1e6)));
+}
+
 void ClothContact::forget() {
   lists_.forget();
   all_ = {};
   near_ = {};
   separation_ = {};
   begin_ = x_ = d_ = {};
+  about_ = {};
+  own_x_ = {};
   window_ = {};
   come_ = moved_ = 0;
 }
@@ -48,21 +55,35 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
   const bool is_known = window_.is_known;
   // the begin of a window of one step told where it ends, unless pairs are led apart meanwhile
   const bool is_read = window_.steps == 1 && untangling_.empty();
-  window_ = {.most_steps = ends_frame ? 1 : std::max(1, static_cast<int>(kWindowTime / dt))};
+  window_ = {.most_steps = ends_frame ? 1 : most_steps(dt)};
   untangling_.lead(sheets, dt);
   if (is_known) {
     if (!is_read) read(sheets);
     act(sheets, ends_frame);
   }
   if (ends_frame) separation_.forget_given();
+  if (lists_.empty()) look_ahead(sheets, in_step);
+}
+
+// Where nothing was near that may last as far as the next window goes.
+void ClothContact::look_ahead(std::span<const MovingSheet> sheets, double in_step) {
+  constexpr double kFaster = 1.1;  // the next step
+  const double come = in_step + kSpare * reach(in_step);
+  if (scene_.solver.plain || lists_.lasts() < 0 || moved_ + come_ + come <= lists_.lasts()) return;
+  about_.resize(4, cloth_.particles());
+  about_.row(3).setZero();
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    sheets[s].solver->positions(own_x_);
+    about_.block(0, cloth_.first_particle[s], 3, own_x_.cols()) = own_x_.cast<float>();
+  }
+  lists_.look(about_, kFaster * come);
+  moved_ = come_ = 0;
 }
 
 void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step) {
-  constexpr double kSpare = 1.25;  // where steps are faster than the ones before
   moved_ += come_;
   come_ = 0;
-  window_.reach = std::clamp(kSpare * window_.most_steps * in_step, kLeastReach * cloth_.thickest,
-                             kWindowReach * cloth_.thickest);
+  window_.reach = reach(in_step);
   const double most_come = in_step + kSpare * window_.reach;
   const bool holds = moved_ + most_come <= lists_.lasts();
   window_.is_known = scene_.solver.plain || !lists_.empty() || !holds;
@@ -74,6 +95,12 @@ void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step) {
   lists_.expect(begin_, most_come);
   moved_ = 0;
   window_.is_known = !lists_.empty();
+}
+
+// Of the motion in a window whose steps are like one, m.
+double ClothContact::reach(double in_step) const {
+  return std::clamp(kSpare * window_.most_steps * in_step, kLeastReach * cloth_.thickest,
+                    kWindowReach * cloth_.thickest);
 }
 
 // What may have met in the window.

@@ -17,11 +17,15 @@ namespace weft {
 // Contact acts once in a window of several steps, in which nothing moves far in relation to what it
 // is near; a window ends with its frame at the latest, so frames can be gone on from. Where it ends
 // it is known how far everything came, and so what may have met, but where nothing was near enough
-// to begin with: what comes of it does not depend on lists, nor on who computes them.
+// to begin with: what comes of it does not depend on lists, nor on who computes them. Where nothing
+// was near, it is seen from rough positions at the end of a window that the next may pass unseen.
 class ClothContact {
  public:
   // Holds on to the scene.
   explicit ClothContact(const Scene& scene, const LeftOut& left_out = {});
+
+  // After how many steps of dt (s) it acts, at most.
+  static int most_steps(double dt);
 
   // Sheets may be anywhere now, or be held otherwise, at the begin of a frame. Nothing that was
   // found before is used, nor kept in memory.
@@ -43,9 +47,11 @@ class ClothContact {
     bool is_known = false;  // where it began
   };
 
+  double reach(double in_step) const;
   void begin_window(std::span<MovingSheet> sheets, double in_step);
   void act(std::span<MovingSheet> sheets, bool ends_frame);
   void find_near();
+  void look_ahead(std::span<const MovingSheet> sheets, double in_step);
   void read(std::span<MovingSheet> sheets);
   void set_out();
   void write(std::span<MovingSheet> sheets);
@@ -62,6 +68,8 @@ class ClothContact {
 
   std::vector<double> inverse_mass_;  // of all particles, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m
+  Places about_;                      // now
+  Matrix3Xd own_x_;                   // of a sheet, m
   Separation separation_;
   Untangling untangling_;
   std::vector<Mover> movers_;

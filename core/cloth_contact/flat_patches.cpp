@@ -60,6 +60,19 @@ bool passes_inside(const std::vector<Vector2d>& polygon, const Vector2d& from, c
   });
 }
 
+// At right angles to each other; the first two lie in a plane that goes both ways.
+Eigen::Matrix3d axes_of(const Eigen::Matrix<double, 3, 2>& ways) {
+  constexpr double kOnALine = 1e-3;  // sine
+  const Vector3d normal = ways.col(0).cross(ways.col(1));
+  if (!(normal.norm() > kOnALine * ways.col(0).norm() * ways.col(1).norm()))
+    return Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d axes;
+  axes.col(0) = ways.col(0).normalized();
+  axes.col(2) = normal.normalized();
+  axes.col(1) = axes.col(2).cross(axes.col(0));
+  return axes;
+}
+
 // Whether no side of `one` has all of the other beyond it.
 bool may_meet(const std::vector<Vector2d>& one, const std::vector<Vector2d>& other) {
   return all_sides(one, [&](const Vector2d& corner, const Vector2d& normal) {
@@ -111,29 +124,44 @@ FlatPatches::FlatPatches(const Cloth& cloth) : cloth_(cloth) {
 
 void FlatPatches::set(const Matrix3Xd& x) {
   x_ = &x;
+  ++now_;
   std::fill(known_.begin(), known_.end(), false);
 }
 
-double FlatPatches::distance(int one, int other) {
-  if (cloth_.piece[static_cast<std::size_t>(one)] != cloth_.piece[static_cast<std::size_t>(other)])
-    return 0;
-  const Patch& over = patch(one, other);
+double FlatPatches::distance(const Blocks& some, const Blocks& others) {
+  Patch& over = patch(some, others);
   if (!over.whole) return 0;
+  if (over.asked_at != now_) {
+    over.asked_at = now_;
+    over.distance = distance(over);
+  }
+  return over.distance;
+}
+
+double FlatPatches::distance(const Patch& over) {
   Gradient sum = Gradient::Zero();
   for (const int block : over.blocks) sum += gradients(block).sum;
   // seen along its mean normal
-  Gradient seen;
-  seen.col(0) = sum.col(0).normalized();
-  seen.col(1) = sum.col(0).cross(sum.col(1)).cross(sum.col(0)).normalized();
+  const Gradient seen = axes_of(sum).leftCols<2>();
   Eigen::Array4d low = Eigen::Array4d::Constant(std::numeric_limits<double>::infinity()),
                  high = -low;
-  for (const int block : over.blocks)
-    for (const Gradient& each : gradients(block).each) {
-      const Eigen::Array4d plane(seen.col(0).dot(each.col(0)), seen.col(1).dot(each.col(0)),
-                                 seen.col(0).dot(each.col(1)), seen.col(1).dot(each.col(1)));
-      low = low.min(plane);
-      high = high.max(plane);
+  constexpr std::size_t kFew = 8;  // blocks, of which each triangle is looked at
+  for (const int block : over.blocks) {
+    const Gradients& own = gradients(block);
+    if (over.blocks.size() <= kFew) {
+      for (const Gradient& each : own.each) {
+        const Eigen::Matrix2d plane = seen.transpose() * each;
+        low = low.min(plane.reshaped().array());
+        high = high.max(plane.reshaped().array());
+      }
+      continue;
     }
+    const Gradient along = own.axes.transpose() * seen;
+    const Eigen::Matrix2d middle = along.transpose() * own.middle,
+                          half = along.cwiseAbs().transpose() * own.half;
+    low = low.min((middle - half).reshaped().array());
+    high = high.max((middle + half).reshaped().array());
+  }
   const Eigen::Array4d middle = (low + high) / 2;
   const double differs = (high - low).matrix().norm() / 2;
   Eigen::Matrix2d plane;
@@ -146,21 +174,26 @@ double FlatPatches::distance(int one, int other) {
   return factor > 0 ? factor * over.least_height : 0;
 }
 
-// Over both blocks and what lies between them.
-const FlatPatches::Patch& FlatPatches::patch(int one, int other) {
-  const auto [low, high] = std::minmax(one, other);
-  const std::uint64_t key = static_cast<std::uint64_t>(low) << 32 | static_cast<unsigned>(high);
-  const auto [place, is_new] = patches_.try_emplace(key);
+// Over these blocks and what lies between them.
+FlatPatches::Patch& FlatPatches::patch(const Blocks& some, const Blocks& others) {
+  const auto [place, is_new] =
+      patches_.try_emplace({some.first, some.last, others.first, others.last});
   Patch& patch = place->second;
   if (!is_new) return patch;
 
-  const auto a = static_cast<std::size_t>(low), b = static_cast<std::size_t>(high);
-  std::vector<Vector2d> corners = hull_[a];
-  corners.insert(corners.end(), hull_[b].begin(), hull_[b].end());
-  const Polygon hull = convex_hull(std::move(corners));
+  const auto a = static_cast<std::size_t>(some.first);
   const int piece = cloth_.piece[a];
+  std::vector<Vector2d> corners;
+  Box box;
+  for (const Blocks& each : {some, others})
+    for (auto b = static_cast<std::size_t>(each.first); b < static_cast<std::size_t>(each.last);
+         ++b) {
+      if (cloth_.piece[b] != piece) return patch;
+      corners.insert(corners.end(), hull_[b].begin(), hull_[b].end());
+      box.extend(box_[b]);
+    }
+  const Polygon hull = convex_hull(std::move(corners));
   const double depth = 1e-9 * least_height_[a];
-  const Box box = box_[a].merged(box_[b]);
   patch.whole = std::none_of(borders_.begin(), borders_.end(), [&](const Border& border) {
     return border.piece == piece &&
            box.intersects(Box(border.from.cwiseMin(border.to), border.from.cwiseMax(border.to))) &&
@@ -183,8 +216,8 @@ const FlatPatches::Gradients& FlatPatches::gradients(int block) {
   Gradients& gradients = gradients_[b];
   if (known_[b]) return gradients;
   known_[b] = true;
-  gradients.each.clear();
   gradients.sum.setZero();
+  gradients.each.clear();
   for (int t = cloth_.first_block[b]; t < cloth_.first_block[b + 1]; ++t) {
     const auto at = static_cast<std::size_t>(t);
     const auto& [i, j, k] = cloth_.triangles[at];
@@ -193,6 +226,15 @@ const FlatPatches::Gradients& FlatPatches::gradients(int block) {
     gradients.each.emplace_back(sides * inverse_[at]);
     gradients.sum += gradients.each.back();
   }
+  gradients.axes = axes_of(gradients.sum);
+  Gradient low = Gradient::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const Gradient& each : gradients.each) {
+    const Gradient along = gradients.axes.transpose() * each;
+    low = low.cwiseMin(along);
+    high = high.cwiseMax(along);
+  }
+  gradients.middle = (low + high) / 2;
+  gradients.half = (high - low) / 2;
   return gradients;
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <cstdint>
-#include <unordered_map>
+#include <array>
+#include <map>
 #include <vector>
 
 #include "core/cloth_contact/cloth.h"
@@ -21,15 +21,22 @@ class FlatPatches {
 
   // From now on cloth is at x, (3 x particles) m, which outlives what is asked.
   void set(const Matrix3Xd& x);
-  // The least distance between particles and edges of two blocks, or within one, that share no
-  // particle, at least, m; 0 where none is known.
-  double distance(int one, int other);
+  // Blocks first ... last - 1.
+  struct Blocks {
+    int first, last;
+  };
+  // The least distance between particles and edges of some blocks and others, or within these, that
+  // share no particle, at least, m; 0 where none is known.
+  double distance(const Blocks& some, const Blocks& others);
 
  private:
   using Gradient = Eigen::Matrix<double, 3, 2>;
-  struct Gradients {  // of the triangles of a block
+  // Of the triangles of a block: they lie in a box along axes that lie in the block.
+  struct Gradients {
     std::vector<Gradient> each;
     Gradient sum;
+    Eigen::Matrix3d axes;
+    Gradient middle, half;  // along these
   };
   using Box = Eigen::AlignedBox2d;
   using Polygon = std::vector<Vector2d>;  // convex, anticlockwise
@@ -37,13 +44,16 @@ class FlatPatches {
     bool whole = false;       // no border lies inside
     double least_height = 0;  // of its triangles, m
     std::vector<int> blocks;
+    int asked_at = 0;     // when the distance was found
+    double distance = 0;  // m
   };
   struct Border {
     int piece;
     Vector2d from, to;
   };
 
-  const Patch& patch(int one, int other);
+  Patch& patch(const Blocks& some, const Blocks& others);
+  double distance(const Patch& over);
   const Gradients& gradients(int block);
 
   const Cloth& cloth_;
@@ -52,9 +62,10 @@ class FlatPatches {
   std::vector<Box> box_;                  // around these
   std::vector<double> least_height_;      // of each block, m
   std::vector<Border> borders_;
-  std::unordered_map<std::uint64_t, Patch> patches_;
+  std::map<std::array<int, 4>, Patch> patches_;
 
   const Matrix3Xd* x_ = nullptr;
+  int now_ = 0;                       // counts what was set
   std::vector<Gradients> gradients_;  // of each block
   std::vector<bool> known_;           // which of them are of x
 };

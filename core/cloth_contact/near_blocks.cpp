@@ -1,7 +1,6 @@
 #include "core/cloth_contact/near_blocks.h"
 
 #include <algorithm>
-#include <limits>
 
 namespace weft {
 
@@ -12,6 +11,8 @@ NearBlocks::NearBlocks(const Cloth& cloth)
       triangle_box_(cloth.triangles.size()),
       boxed_(box_.size()) {
   nodes_.resize(4 * box_.size());
+  number_.resize(box_.size());
+  number_node(root());
   std::vector<int> in_block;
   first_particle_.push_back(0);
   for (std::size_t b = 0; b < box_.size(); ++b) {
@@ -42,13 +43,12 @@ const NearBlocks::Box& NearBlocks::block_box(int block) {
 }
 
 std::vector<BlockPair> NearBlocks::meet(double reach) {
-  reach_ = reach;
-  met_.clear();
-  const Node root{1, 0, blocks()};
-  box_node(root);
-  meet_within(root);
-  std::sort(met_.begin(), met_.end());
-  return met_;
+  std::vector<BlockPair> met;
+  share_out(
+      root(), root(), [&](const Node&, const Node&, double gap) { return gap > reach; },
+      [&](const BlockPair& blocks) { met.push_back(blocks); });
+  std::sort(met.begin(), met.end());
+  return met;
 }
 
 void NearBlocks::box_node(const Node& node) {
@@ -61,50 +61,27 @@ void NearBlocks::box_node(const Node& node) {
   box(node) = box(node.half(0)).merged(box(node.half(1)));
 }
 
-void NearBlocks::meet_within(const Node& node) {
+void NearBlocks::number_node(const Node& node) {
+  constexpr int kFlatTogether = 8;
+  if (node.count() <= kFlatTogether && around_.size() == static_cast<std::size_t>(node.first))
+    around_.resize(static_cast<std::size_t>(node.last), {node.first, node.last});
   if (node.count() == 1) {
-    met_.push_back({node.first, node.first});
+    number_[static_cast<std::size_t>(node.first)] = node.number;
     return;
   }
-  meet_within(node.half(0));
-  meet_within(node.half(1));
-  meet_between(node.half(0), node.half(1));
+  number_node(node.half(0));
+  number_node(node.half(1));
 }
 
-void NearBlocks::meet_between(const Node& one, const Node& other) {
-  if (gap(box(one), box(other)) > reach_) return;
-  if (one.count() == 1 && other.count() == 1) {
-    met_.push_back({one.first, other.first});
-    return;
-  }
-  const bool halve_one = one.count() >= other.count();
-  for (const int which : {0, 1})
-    meet_between(halve_one ? one.half(which) : one, halve_one ? other : other.half(which));
-}
-
-double NearBlocks::distance(const BlockPair& blocks) {
+double NearBlocks::distance(const BlockPair& blocks, double enough) {
   const auto& [one, other] = blocks;
   const double between = gap(block_box(one), block_box(other));
-  return between > 0 ? between : flat_.distance(one, other);
-}
-
-NearBlocks::Box NearBlocks::box_motion(const Matrix3Xd& from, const Matrix3Xd& to,
-                                       std::vector<Box>& motion) const {
-  Box all;
-  motion.resize(box_.size());
-  for (std::size_t b = 0; b < box_.size(); ++b) {
-    // by values that stay in registers
-    Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()),
-                   high = -low;
-    for (const int i : particles(static_cast<int>(b))) {
-      const Eigen::Array3d by = to.col(i).array() - from.col(i).array();
-      low = low.min(by);
-      high = high.max(by);
-    }
-    motion[b] = Box(low.matrix(), high.matrix());
-    all.extend(motion[b]);
-  }
-  return all;
+  if (between > 0) return between;
+  const double together = flat_.distance(around_[static_cast<std::size_t>(one)],
+                                         around_[static_cast<std::size_t>(other)]);
+  return together >= enough
+             ? together
+             : std::max(together, flat_.distance({one, one + 1}, {other, other + 1}));
 }
 
 void NearBlocks::box_triangles(std::size_t block) {

@@ -19,18 +19,46 @@ struct BlockPair {
 class NearBlocks {
  public:
   using Box = Eigen::AlignedBox3d;
+  // Blocks first ... last - 1; its halves are 2 number and 2 number + 1.
+  struct Node {
+    int number, first, last;
+    int count() const { return last - first; }
+    Node half(int which) const {
+      const int middle = (first + last) / 2;
+      return which == 0 ? Node{2 * number, first, middle} : Node{2 * number + 1, middle, last};
+    }
+  };
 
   explicit NearBlocks(const Cloth& cloth);
 
   int blocks() const { return static_cast<int>(box_.size()); }
+  Node root() const { return {1, 0, blocks()}; }
+  // Of a block: the node that has it alone.
+  int number(int block) const { return number_[static_cast<std::size_t>(block)]; }
   // From now on cloth is at x, (3 x particles) m, which outlives what is asked.
   void set(const Matrix3Xd& x);
   // Two blocks, or a block and itself, whose boxes are no farther apart than `reach`, m, along any
   // axis; in ascending order.
   std::vector<BlockPair> meet(double reach);
+  // Shares out every two blocks of two nodes, or of one and every block with itself: calls
+  // is_far(one, other, gap of their boxes, m) for nodes, and where that is false for their halves;
+  // near(blocks) for what is left.
+  template <class IsFar, class Near>
+  void share_out(const Node& one, const Node& other, const IsFar& is_far, const Near& near) {
+    box_node(one);
+    if (one.number != other.number) box_node(other);
+    one.number == other.number ? share_out_within(one, is_far, near)
+                               : share_out_between(one, other, is_far, near);
+  }
   // The least distance between what shares no particle in two blocks, at least, m; 0 where that
-  // takes a closer look.
-  double distance(const BlockPair& blocks);
+  // takes a closer look. The closest is not looked for where it is `enough`.
+  double distance(const BlockPair& blocks, double enough = 0);
+  // That between the boxes of nodes, along the axis on which they are farthest apart, m.
+  double distance(const Node& one, const Node& other) {
+    box_node(one);
+    box_node(other);
+    return gap(box(one), box(other));
+  }
   // Calls f(one, other) for every two triangles of two blocks whose boxes are no farther apart than
   // `reach`, m.
   template <class F>
@@ -49,21 +77,8 @@ class NearBlocks {
         .subspan(static_cast<std::size_t>(first_particle_[b]),
                  static_cast<std::size_t>(first_particle_[b + 1] - first_particle_[b]));
   }
-  // Around what the particles of each block moved by from one place to the other, m; returns that
-  // of all.
-  Box box_motion(const Matrix3Xd& from, const Matrix3Xd& to, std::vector<Box>& motion) const;
 
  private:
-  // Blocks first ... last - 1; its halves are 2 number and 2 number + 1.
-  struct Node {
-    int number, first, last;
-    int count() const { return last - first; }
-    Node half(int which) const {
-      const int middle = (first + last) / 2;
-      return which == 0 ? Node{2 * number, first, middle} : Node{2 * number + 1, middle, last};
-    }
-  };
-
   // Along the axis on which they are farthest apart, m.
   static double gap(const Box& one, const Box& other) {
     return (one.min() - other.max()).cwiseMax(other.min() - one.max()).maxCoeff();
@@ -75,8 +90,24 @@ class NearBlocks {
   }
   void box_node(const Node& node);
   void box_triangles(std::size_t block);
-  void meet_within(const Node& node);
-  void meet_between(const Node& one, const Node& other);
+  template <class IsFar, class Near>
+  void share_out_within(const Node& node, const IsFar& is_far, const Near& near) {
+    if (node.count() == 1) return near(BlockPair{node.first, node.first});
+    share_out_within(node.half(0), is_far, near);
+    share_out_within(node.half(1), is_far, near);
+    share_out_between(node.half(0), node.half(1), is_far, near);
+  }
+  template <class IsFar, class Near>
+  void share_out_between(const Node& one, const Node& other, const IsFar& is_far,
+                         const Near& near) {
+    if (is_far(one, other, gap(box(one), box(other)))) return;
+    if (one.count() == 1 && other.count() == 1) return near(BlockPair{one.first, other.first});
+    const bool halve_one = one.count() >= other.count();
+    for (const int which : {0, 1})
+      share_out_between(halve_one ? one.half(which) : one, halve_one ? other : other.half(which),
+                        is_far, near);
+  }
+  void number_node(const Node& node);
   void choose(int block, int near, double reach, std::vector<int>& triangles);
 
   const Cloth& cloth_;
@@ -84,10 +115,10 @@ class NearBlocks {
   std::vector<int> first_particle_, particles_;  // of each block
   std::vector<Box> nodes_, box_, triangle_box_;  // empty where not known
   std::vector<bool> boxed_;                      // of each block: its triangles
+  std::vector<int> number_;                      // of each block
+  std::vector<FlatPatches::Blocks> around_;      // each: some that may be flat together
 
   const Matrix3Xd* x_ = nullptr;
-  double reach_ = 0;
-  std::vector<BlockPair> met_;
   std::vector<int> near_one_, near_other_;
 };
 

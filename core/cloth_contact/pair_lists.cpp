@@ -7,76 +7,146 @@
 
 namespace weft {
 
-PairLists::PairLists(const Cloth& cloth) : cloth_(cloth), blocks_(cloth) {}
+PairLists::PairLists(const Cloth& cloth)
+    : cloth_(cloth), blocks_(cloth), since_(blocks_), in_window_(blocks_) {}
 
 void PairLists::forget() {
   before_ = {};
+  before_about_ = {};
   states_ = {};
   lists_ = {};
-  since_ = in_window_ = {};
-  near_ = 0;
-  met_left_ = lasts_ = -1;
+  apart_ = still_apart_ = {};
+  since_.forget();
+  in_window_.forget();
+  near_ = met_ = 0;
+  lasts_ = -1;
 }
 
 void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now) {
-  const NearBlocks::Box all = blocks_.box_motion(from, now, in_window_);
-  look(from, all);
+  in_window_.set(from, now);
+  look(
+      from, [&](int one, int other) { return length(in_window_.between(one, other)); }, 0);
 }
 
 void PairLists::expect(const Matrix3Xd& from, double come) {
-  const Vector3d half = Vector3d::Constant(come / (2 * std::sqrt(3.0)));
-  const NearBlocks::Box all(-half, half);
-  in_window_.assign(static_cast<std::size_t>(blocks_.blocks()), all);
-  look(from, all);
+  // when it does not hold any more much else will soon not
+  look(
+      from, [&](int, int) { return length(come); }, 0.5 * cloth_.thickest);
 }
 
-void PairLists::look(const Matrix3Xd& x, const NearBlocks::Box& all_in_window) {
-  const double thickest = cloth_.thickest, comes = length(all_in_window);
+// came(one, other): how far two nodes come in relation to each other in the window, m. What holds
+// for less than `spare` beyond that is made anew, too, m.
+template <class Came>
+void PairLists::look(const Matrix3Xd& x, const Came& came, double spare) {
+  const double thickest = cloth_.thickest;
   blocks_.set(x);
-  double moved = kMostMotion * thickest;
   if (before_.cols() > 0) {
-    moved = length(blocks_.box_motion(before_, x, since_));
+    since_.set(before_, x);
     for (State& state : states_) {
-      const double by = between(since_, state.blocks);
+      const double by = since_.between(number(state.blocks.one), number(state.blocks.other));
       state.left -= by;
       state.near_left -= by;
     }
+    for (Apart& apart : apart_) apart.left -= since_.between(apart.one.number, apart.other.number);
   }
+  meet(came, spare);
   before_ = x;
+  before_about_.resize(4, x.cols());
+  before_about_.topRows<3>() = x.cast<float>();
+  before_about_.row(3).setZero();
 
-  constexpr double kBlocksReach = 5;  // of the thickest cloth
-  met_left_ -= moved;
-  if (!(met_left_ >= comes)) meet(std::max(kBlocksReach * thickest, 4 * comes));
-
-  lasts_ = met_left_;
+  lasts_ = kMostMotion * thickest;
   near_ = 0;
   for (std::size_t k = 0; k < states_.size(); ++k) {
     State& state = states_[k];
     // some windows pass until they are looked at again; lists of flat cloth stay empty: what
     // shares no particle there is 2.8 thicknesses apart
-    const double came = state.came = between(in_window_, state.blocks);
-    if (!(state.left >= came))
-      renew(x, came + std::min(2 * came, 0.5 * thickest) + 0.1 * thickest,
-            std::max(1.6 * thickest, came + std::min(7 * came, thickest)), state, lists_[k]);
-    if (state.has_some && !(state.near_left >= came))
-      prune(x, came + std::clamp(3 * came, 0.05 * thickest, 0.5 * thickest), state, lists_[k]);
+    const double comes = state.came = came(number(state.blocks.one), number(state.blocks.other));
+    if (!(state.left >= comes + spare))
+      renew(x, comes + std::min(2 * comes, 0.5 * thickest) + 0.1 * thickest,
+            std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + 3 * spare, state,
+            lists_[k]);
+    if (state.has_some && !(state.near_left >= comes + spare / 2))
+      prune(x, comes + std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest), state, lists_[k]);
     lasts_ = std::min(lasts_, state.has_some ? state.near_left : state.left);
     if (state.is_near) ++near_;
   }
+  for (const Apart& apart : apart_) lasts_ = std::min(lasts_, apart.left);
 }
 
-// What all within a box moved by in relation to each other, m.
-double PairLists::length(const NearBlocks::Box& motion) const {
-  constexpr double kRounding = 1e-12;  // m, of positions
-  const double most = kMostMotion * cloth_.thickest, moved = motion.diagonal().norm() + kRounding;
-  return moved < most ? moved : most;
+void PairLists::look(const Places& now, double come) {
+  constexpr std::size_t kShare = 8;  // of all: more are looked at anew together
+  since_.set(before_about_, now);
+  const double rounding = since_.rounding();
+  const std::size_t most = (states_.size() + apart_.size()) / kShare;
+  std::size_t closer = 0;
+  const auto look_closer = [&] {
+    if (closer++ > 0) return closer <= most;
+    now_all_ = now.topRows<3>().cast<double>();
+    blocks_.set(now_all_);
+    return true;
+  };
+  lasts_ = kMostMotion * cloth_.thickest;
+  for (std::size_t k = 0; k < states_.size() && lasts_ >= come; ++k) {
+    const State& state = states_[k];
+    const double by = since_.between(number(state.blocks.one), number(state.blocks.other));
+    double left = (state.has_some ? state.near_left : state.left) - by;
+    if (left < come && look_closer())
+      left = left_at(now_all_, state, lists_[k], state.left - by, come + rounding) - rounding;
+    lasts_ = std::min(lasts_, left);
+  }
+  for (std::size_t k = 0; k < apart_.size() && lasts_ >= come; ++k) {
+    const auto& [one, other, left_then] = apart_[k];
+    double left = left_then - since_.between(one.number, other.number);
+    if (left < come && look_closer())
+      left = blocks_.distance(one, other) - cloth_.thickest - rounding;
+    lasts_ = std::min(lasts_, left);
+  }
 }
 
-// What two blocks moved by in relation to each other, m: what each moved by lies in a box, and what
-// both moved by in one around these.
-double PairLists::between(const Motion& motion, const BlockPair& blocks) const {
-  return length(motion[static_cast<std::size_t>(blocks.one)].merged(
-      motion[static_cast<std::size_t>(blocks.other)]));
+// Of a list without any that are near: how far its pairs may come at x until some are, m. `left`:
+// at least, of all it has. Looks for no more than `enough`.
+double PairLists::left_at(const Matrix3Xd& x, const State& state, const List& list, double left,
+                          double enough) {
+  if (list.made_at.cols() == 0)
+    return blocks_.distance(state.blocks, cloth_.thickest + enough) - cloth_.thickest;
+  if (left < enough) left = std::max(left, list.reach - change(x, state.blocks, list));
+  if (state.has_some && left >= enough) nearer(list.all, x, 0, left);
+  return left;
+}
+
+// Has states for all blocks that may be near.
+template <class Came>
+void PairLists::meet(const Came& came, double spare) {
+  constexpr double kApart = 1.5;  // of the thickest cloth, beside what it comes
+  const bool all = before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_;
+  std::vector<BlockPair> met;
+  const auto is_far = [&](const NearBlocks::Node& one, const NearBlocks::Node& other, double gap) {
+    const double left = gap - cloth_.thickest;
+    if (left < came(one.number, other.number) + kApart * cloth_.thickest) return false;
+    still_apart_.push_back({one, other, left});
+    return true;
+  };
+  const auto near = [&](const BlockPair& blocks) { met.push_back(blocks); };
+  still_apart_.clear();
+  if (all) {
+    blocks_.share_out(blocks_.root(), blocks_.root(), is_far, near);
+  } else {
+    for (const Apart& apart : apart_)
+      if (apart.left >= came(apart.one.number, apart.other.number) + spare)
+        still_apart_.push_back(apart);
+      else
+        blocks_.share_out(apart.one, apart.other, is_far, near);
+  }
+  std::swap(apart_, still_apart_);
+  std::sort(met.begin(), met.end());
+  if (all || !met.empty()) add(met, all);
+  if (all) met_ = apart_.size() + states_.size();
+}
+
+double PairLists::length(double came) const {
+  const double most = kMostMotion * cloth_.thickest;
+  return came < most ? came : most;
 }
 
 // Positions of the particles of both blocks, or of the one.
@@ -119,18 +189,28 @@ double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List
   return changed < list.reach ? changed : list.reach;
 }
 
-// Keeps the lists of blocks that have met before.
-void PairLists::meet(double reach) {
+// Adds blocks that have met, in their order; of the lists before it keeps all, or only theirs.
+void PairLists::add(const std::vector<BlockPair>& met, bool only) {
   const std::vector<State> old_states = std::exchange(states_, {});
   std::vector<List> old_lists = std::exchange(lists_, {});
   std::size_t known = 0;
-  for (const BlockPair& blocks : blocks_.meet(cloth_.thickest + reach)) {
-    while (known < old_states.size() && old_states[known].blocks < blocks) ++known;
-    const bool is_known = known < old_states.size() && old_states[known].blocks == blocks;
-    states_.push_back(is_known ? old_states[known] : State{blocks});
-    lists_.push_back(is_known ? std::move(old_lists[known]) : List{});
+  const auto keep = [&] {
+    states_.push_back(old_states[known]);
+    lists_.push_back(std::move(old_lists[known]));
+  };
+  for (const BlockPair& blocks : met) {
+    for (; known < old_states.size() && old_states[known].blocks < blocks; ++known)
+      if (!only) keep();
+    if (known < old_states.size() && old_states[known].blocks == blocks) {
+      keep();
+      ++known;
+    } else {
+      states_.push_back({blocks});
+      lists_.emplace_back();
+    }
   }
-  met_left_ = reach;
+  if (only) return;
+  for (; known < old_states.size(); ++known) keep();
 }
 
 void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& state, List& list) {
@@ -139,7 +219,7 @@ void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& sta
   list = {};
   state.has_some = state.is_near = false;
   state.near_left = -1;
-  state.left = blocks_.distance(state.blocks) - cloth_.thickest;
+  state.left = blocks_.distance(state.blocks, cloth_.thickest + least) - cloth_.thickest;
   if (state.left >= least) return;
   state.left = list.reach = reach;
   place(x, state.blocks, list.made_at);
@@ -148,8 +228,8 @@ void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& sta
 }
 
 void PairLists::prune(const Matrix3Xd& x, double reach, State& state, List& list) {
-  state.near_left = std::min(reach, state.left);
-  list.near = nearer(list.all, x, reach);
+  state.near_left = state.left;
+  list.near = nearer(list.all, x, reach, state.near_left);
   state.is_near = !list.near.empty();
 }
 

@@ -2,13 +2,14 @@
 
 #include <vector>
 
+#include "core/cloth_contact/block_motion.h"
 #include "core/cloth_contact/near_blocks.h"
 #include "core/cloth_contact/pairs.h"
 
 namespace weft {
 
 // The pairs that may have met in a window of steps, kept in lists (Verlet 1967), one for each two
-// blocks that are near each other. A list has what was nearer than its thickness and some reach
+// blocks that may be near each other. A list has what was nearer than its thickness and some reach
 // when it was made, and of that what was nearer still when it was pruned (Pall & Hess 2013); it
 // holds until these two blocks have moved as far in relation to each other, however far they came
 // together.
@@ -26,8 +27,11 @@ class PairLists {
   // The same for a window that begins at `from`, in which nothing will come farther in relation to
   // anything else than `come`, m.
   void expect(const Matrix3Xd& from, double come);
-  // How far particles may come in relation to each other from the last `from` on until lists do
-  // not hold any more, m.
+  // While they are empty: cloth that was at the last `from` is now about here. Looks only whether
+  // it may come as far as `come` from here on, m.
+  void look(const Places& now, double come);
+  // How far particles may come in relation to each other, from the last `from` or place looked at
+  // on, until lists do not hold any more, m.
   double lasts() const { return lasts_; }
   // Of the thickest cloth; pairs that came farther in a window, or since the last update, may be
   // missed.
@@ -55,27 +59,38 @@ class PairLists {
     Matrix3Xd made_at = {};  // of the particles of both blocks, m; or empty
     Candidates all = {}, near = {};
   };
-  using Motion = std::vector<NearBlocks::Box>;  // of each block, m
+  // Nodes of blocks that are so far apart that no two of their blocks have a list.
+  struct Apart {
+    NearBlocks::Node one, other;
+    double left;  // until they may be near, m
+  };
 
-  void look(const Matrix3Xd& x, const NearBlocks::Box& all_in_window);
-  void meet(double reach);
-  double length(const NearBlocks::Box& motion) const;
-  double between(const Motion& motion, const BlockPair& blocks) const;
+  template <class Came>
+  void look(const Matrix3Xd& x, const Came& came, double spare);
+  template <class Came>
+  void meet(const Came& came, double spare);
+  void add(const std::vector<BlockPair>& met, bool only);
+  double length(double came) const;  // no more than kMostMotion
+  int number(int block) const { return blocks_.number(block); }
   void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
+  double left_at(const Matrix3Xd& x, const State& state, const List& list, double left,
+                 double enough);
   double change(const Matrix3Xd& x, const BlockPair& blocks, const List& list);
   void renew(const Matrix3Xd& x, double least, double reach, State& state, List& list);
   static void prune(const Matrix3Xd& x, double reach, State& state, List& list);
 
   const Cloth& cloth_;
   NearBlocks blocks_;
-  Matrix3Xd before_;           // where the window of the last update began, m; or empty
-  double met_left_ = -1;       // of the reach that blocks were met with, m
-  double lasts_ = -1;          // m
+  Matrix3Xd before_;     // where the window of the last update began, m; or empty
+  Places before_about_;  // the same
+  double lasts_ = -1;    // m
+  std::vector<Apart> apart_, still_apart_;
+  std::size_t met_ = 0;        // of them and of states, when all were looked for
   std::vector<State> states_;  // in ascending order of blocks
   std::vector<List> lists_;    // of these
   std::size_t near_ = 0;       // lists that have some
-  Motion since_, in_window_;
-  Matrix3Xd now_;
+  BlockMotion since_, in_window_;
+  Matrix3Xd now_, now_all_;
 };
 
 }  // namespace weft

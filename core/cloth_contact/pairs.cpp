@@ -1,6 +1,7 @@
 #include "core/cloth_contact/pairs.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/cloth_contact/pair_batch.h"
@@ -86,7 +87,8 @@ Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs) {
   return made;
 }
 
-Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach) {
+Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach,
+                  double& reach_of_others) {
   Candidates near;
   const auto particles = [](const Candidate& candidate) { return candidate.particle; };
   for (const bool edges : {false, true}) {
@@ -94,7 +96,11 @@ Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach
     for_each_distance(edges, edges ? candidates.edges : candidates.corners, particles, x,
                       [&](const Candidate& candidate, double squared) {
                         const double within = candidate.thickness + reach;
-                        if (squared < within * within) to.push_back(candidate);
+                        if (squared < within * within)
+                          to.push_back(candidate);
+                        else
+                          reach_of_others =
+                              std::min(reach_of_others, std::sqrt(squared) - candidate.thickness);
                       });
   }
   return near;

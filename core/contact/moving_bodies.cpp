@@ -17,6 +17,16 @@ int parts_of(const Poses& poses, std::size_t pose, double cell) {
              : 1;
 }
 
+// Whether it keeps its shape from a pose to the next.
+bool is_still(const Poses& poses, std::size_t pose) {
+  return pose >= poses.own_ways.size() || poses.own_ways[pose] == 0;
+}
+
+// Whether the grid of the pose before is its own, too.
+bool shares_grid(const Poses& poses, std::size_t pose) {
+  return pose > 0 && is_still(poses, pose) && is_still(poses, pose - 1);
+}
+
 // Around its middle.
 Vector3d place_at(const Poses& poses, std::size_t pose, double share, std::size_t vertex) {
   Vector3d at = poses.position(pose, vertex) - poses.middles[pose];
@@ -91,10 +101,7 @@ void MovingBodies::place(Moving& moving, double time, double dt) {
 std::shared_ptr<const PoseGrid> MovingBodies::grid(Moving& moving, At at) {
   const Poses& poses = *moving.poses;
   // where it keeps its shape, one is enough
-  const auto still = [&](std::size_t p) {
-    return p >= poses.own_ways.size() || poses.own_ways[p] == 0;
-  };
-  while (at.first > 0 && at.second == 0 && still(at.first) && still(at.first - 1)) --at.first;
+  while (at.second == 0 && shares_grid(poses, at.first)) --at.first;
   const auto known = moving.grids.find(at);
   if (known != moving.grids.end()) return known->second;
   const double cell = moving.body->grid.cell;
@@ -115,6 +122,13 @@ std::shared_ptr<const PoseGrid> MovingBodies::grid(Moving& moving, At at) {
     moving.grids.erase(moving.grids.begin()->first < at ? moving.grids.begin()
                                                         : std::prev(moving.grids.end()));
   return moving.grids[at] = std::move(made);
+}
+
+std::int64_t count_grids(const Poses& poses, double cell) {
+  std::int64_t count = 0;
+  for (std::size_t pose = 0; pose < poses.times.size(); ++pose)
+    count += parts_of(poses, pose, cell) - (shares_grid(poses, pose) ? 1 : 0);
+  return count;
 }
 
 double least_pose_cell(const Poses& poses, const std::vector<std::array<int, 3>>& triangles) {

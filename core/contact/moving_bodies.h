@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <span>
@@ -51,6 +52,9 @@ class MovingBodies {
 
   std::map<std::size_t, Moving> bodies_;  // by collider
 };
+
+// How many grids are made while it moves through all of its poses.
+std::int64_t count_grids(const Poses& poses, double cell);
 
 // The cell below which grids of a pose take too much memory or time, m.
 double least_pose_cell(const Poses& poses, const std::vector<std::array<int, 3>>& triangles);

@@ -1,5 +1,6 @@
 #include "core/cloth_contact/cloth_contact.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -188,6 +189,45 @@ TEST(ClothContact, MissesNoPairThatAPlainSearchOfAllFinds) {
   }
 }
 
+// Bit for bit: one that is folded over swings together, of which nothing is near to begin with.
+TEST(ClothContact, MissesNoPairOfASheetThatSwingsTogetherFromAfar) {
+  for (SheetDefinition sheet : {triangles(0.16, 0.08), lattice(17, 9)}) {
+    SCOPED_TRACE(sheet.name);
+    Matrix3Xd x = start_positions(sheet), v = Matrix3Xd::Zero(3, x.cols());
+    const double half = 0.08, angle = 0.9;
+    for (Eigen::Index i = 0; i < x.cols(); ++i) {
+      const bool along = sheet.name == "triangles";
+      const double s = (along ? x(0, i) : x(2, i)) - half, across = along ? x(2, i) : x(0, i);
+      x.col(i) = Vector3d(across, std::abs(s) * std::sin(angle), s * std::cos(angle));
+      v.col(i) = Vector3d(0.3, 0, -30 * s);
+    }
+    sheet.start_positions = values((x + 1e-4 * noise(static_cast<int>(x.cols()))).eval());
+    sheet.start_velocities = values(v);
+    Scene listed = touching({sheet});
+    listed.environment.gravity.setZero();
+    listed.solver.frame_step = 0.005;
+    Scene plain = listed;
+    plain.solver.plain = true;
+    const SolverFactory fast = [](const Scene& scene, const SheetDefinition& definition,
+                                  const Mesh& mesh, const Dynamics& dynamics) {
+      Scene other = scene;
+      other.solver.plain = false;
+      return make_solver(other, definition, mesh, dynamics);
+    };
+    Simulation one(listed, fast), other(plain, fast);
+    listed.cloth_contact = false;
+    Simulation passing(listed);
+    int same = 0;  // frames before anything met
+    for (int frame = 0; frame < 8; ++frame) {
+      for (Simulation* each : {&one, &other, &passing}) ASSERT_TRUE(each->advance_frame());
+      ASSERT_EQ(positions(one), positions(other)) << frame;
+      same += positions(one) == positions(passing) ? 1 : 0;
+    }
+    EXPECT_GT(same, 0);
+    EXPECT_LT(same, 8);
+  }
+}
+
 class Threads : public ThreadPool {
  public:
   explicit Threads(int threads) : threads_(threads) {}
@@ -344,6 +384,23 @@ TEST(ClothContact, CutsOfAFrameAreAmongItsFacts) {
   EXPECT_EQ(Simulation(scene).stats().cloth_cuts, 0);
   scene.cloth_contact = false;
   EXPECT_EQ(Simulation(scene).stats().cloth_cuts, std::nullopt);
+}
+
+TEST(ClothContact, IsNamedInThePlanWithWhatItCostsOrWhyItIsSkipped) {
+  Scene scene = touching({lattice(5, 4)});
+  std::get<MeasuredTextile>(scene.sheets[0].textile.model).tensile_warp = 1e4;
+  const Plan plan = Simulation(scene).plan();
+  const auto steps = static_cast<int>(2.5e-4 / plan.step.substep);
+  ASSERT_GT(steps, 1);
+  const std::string line = "lattice: cloth contact at 0.002 m, 24 triangles, every " +
+                           std::to_string(steps) + " substeps or fewer";
+  EXPECT_THAT(plan.passes, ::testing::Contains(line));
+  scene.cloth_contact = false;
+  const Plan without = Simulation(scene).plan();
+  EXPECT_TRUE(
+      std::any_of(without.skipped.begin(), without.skipped.end(), [](const SkippedPass& skipped) {
+        return skipped.pass == "cloth contact" && skipped.reason == "cloth_contact is not set";
+      }));
 }
 
 TEST(ClothContact, ThicknessIsBoundedByTheMesh) {

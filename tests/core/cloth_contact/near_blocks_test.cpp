@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/cloth_contact/block_motion.h"
 #include "core/cloth_contact/pairs.h"
 #include "core/triangles/cut.h"
 #include "tests/support/core/scenes.h"
@@ -74,6 +75,34 @@ TEST(NearBlocks, HaveEveryPairWithinReach) {
     }
     EXPECT_GT(most, 1000u);
   }
+}
+
+TEST(BlockMotion, IsNoLessThanWhatAnyTwoParticlesMovedBy) {
+  const Cloth cloth({flat_sheet(17, 17, 0.01)});
+  const NearBlocks near(cloth);
+  BlockMotion exact(near), rough(near);
+  const Matrix3Xd from = start_positions(flat_sheet(17, 17, 0.01)).colwise() + Vector3d(3, -2, 7),
+                  to = from + 2e-3 * noise(cloth.particles());
+  const auto rounded = [](const Matrix3Xd& x) {
+    Places places = Places::Zero(4, x.cols());
+    places.topRows<3>() = x.cast<float>();
+    return places;
+  };
+  exact.set(from, to);
+  rough.set(rounded(from), rounded(to));
+  for (int a = 0; a < near.blocks(); ++a)
+    for (int b = a; b < near.blocks(); ++b) {
+      double most = 0;
+      for (const int i : near.particles(a))
+        for (const int j : near.particles(b))
+          most = std::max(most, (to.col(i) - from.col(i) - to.col(j) + from.col(j)).norm());
+      const double found = exact.between(near.number(a), near.number(b));
+      EXPECT_GE(found, most);
+      EXPECT_LT(found, 2e-3 * 2 * std::sqrt(3.0));
+      EXPECT_GE(rough.between(near.number(a), near.number(b)), most);
+      EXPECT_GE(exact.between(1, 1), found);
+    }
+  EXPECT_LT(rough.rounding(), 1e-4);
 }
 
 TEST(NearBlocks, AreKnownToBeApartWhereClothLiesFlat) {

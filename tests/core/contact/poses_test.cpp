@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
@@ -260,6 +261,21 @@ TEST(Poses, WakeASheetThatLiesStillOnlyAsLongAsTheyChange) {
   EXPECT_TRUE(simulation.at_rest());
   EXPECT_TRUE(simulation.repairs().empty());
   EXPECT_NEAR(positions(simulation)(1, 12), 0.01 + 1e-3, 1e-5);
+}
+
+// A grid for each cell that its surface goes past its middle, and none anew where it keeps its
+// shape.
+TEST(Poses, HaveTheirGridsCountedInThePlan) {
+  // grows by 12 mm to the second pose, in cells of 5 mm, and stays like that
+  const auto way = [](const Vector3d& vertex, double time) {
+    return Vector3d((1 + 0.12 * std::min(time, 1.0)) * vertex);
+  };
+  Scene scene = floating(flat_sheet(2, 2));
+  scene.colliders = {posed(ball_mesh(0.1, 2), {0, 1, 2, 3}, way)};
+  scene.colliders[0].name = "ball";
+  const Plan plan = Simulation(scene).plan();
+  EXPECT_THAT(plan.passes,
+              ::testing::Contains("ball: 4 poses, 4 grids of 320 triangles, cells of 0.005 m"));
 }
 
 TEST(Poses, HaveCellsThatTheirLargestOneCanBear) {

@@ -1,0 +1,67 @@
+#include "core/cloth_contact/block_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace weft {
+
+BlockMotion::BlockMotion(const NearBlocks& blocks) : blocks_(blocks) {}
+
+void BlockMotion::forget() {
+  box_ = {};
+  joined_ = {};
+}
+
+// by(i): what a particle moved by, m.
+template <class By>
+void BlockMotion::box(const By& by) {
+  if (box_.empty()) {
+    box_.resize(4 * static_cast<std::size_t>(blocks_.blocks()));
+    std::vector<NearBlocks::Node> nodes = {blocks_.root()};
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      const NearBlocks::Node node = nodes[k];
+      if (node.count() == 1) continue;
+      joined_.insert(joined_.begin(), node.number);
+      nodes.push_back(node.half(0));
+      nodes.push_back(node.half(1));
+    }
+  }
+  for (int b = 0; b < blocks_.blocks(); ++b) {
+    // by values that stay in registers
+    Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity()),
+                   high = -low;
+    for (const int i : blocks_.particles(b)) {
+      const Eigen::Array4f moved = by(i);
+      low = low.min(moved);
+      high = high.max(moved);
+    }
+    box_[static_cast<std::size_t>(blocks_.number(b))] = {low, high};
+  }
+  for (const int node : joined_) {
+    const Box &one = box_[static_cast<std::size_t>(2 * node)],
+              &other = box_[static_cast<std::size_t>(2 * node + 1)];
+    box_[static_cast<std::size_t>(node)] = {one.low.min(other.low), one.high.max(other.high)};
+  }
+}
+
+void BlockMotion::set(const Matrix3Xd& from, const Matrix3Xd& to) {
+  rounding_ = 1e-12;
+  box([&](int i) -> Eigen::Array4f {
+    const double *a = &from(0, i), *b = &to(0, i);
+    return {static_cast<float>(b[0] - a[0]), static_cast<float>(b[1] - a[1]),
+            static_cast<float>(b[2] - a[2]), 0};
+  });
+}
+
+void BlockMotion::set(const Places& from, const Places& to) {
+  constexpr double kEach = 4 * 0x1p-24;  // of two places and their difference
+  const float farthest = std::max(from.cwiseAbs().maxCoeff(), to.cwiseAbs().maxCoeff());
+  rounding_ = 4 * std::sqrt(3.0) * kEach * double{farthest};
+  const float *a = from.data(), *b = to.data();
+  box([a, b](int i) -> Eigen::Array4f {
+    return Eigen::Array4f::MapAligned(b + 4 * i) - Eigen::Array4f::MapAligned(a + 4 * i);
+  });
+}
+
+}  // namespace weft

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/cloth_contact/near_blocks.h"
+
+namespace weft {
+
+// Of particles, rounded to single precision, m; fourth components are 0. (4 x particles)
+using Places = Eigen::Matrix4Xf;
+
+// What the particles of each block, and of each node of blocks, moved by from one place to another:
+// it lies in a box.
+class BlockMotion {
+ public:
+  explicit BlockMotion(const NearBlocks& blocks);
+
+  // (3 x particles) m
+  void set(const Matrix3Xd& from, const Matrix3Xd& to);
+  void set(const Places& from, const Places& to);
+  void forget();
+
+  // How far what is in two nodes, or blocks, moved in relation to each other, at most, m: what both
+  // moved by lies in a box around theirs.
+  double between(int one, int other) const {
+    const Box &a = box_[static_cast<std::size_t>(one)], &b = box_[static_cast<std::size_t>(other)];
+    const Eigen::Array4f sides = a.high.max(b.high) - a.low.min(b.low);
+    return kOfRounding * double{sides.matrix().norm()} + rounding_;
+  }
+  // What rounding of places adds to that, m.
+  double rounding() const { return rounding_; }
+
+ private:
+  static constexpr double kOfRounding = 1 + 1e-6;
+  struct Box {
+    Eigen::Array4f low, high;
+  };
+  template <class By>
+  void box(const By& by);
+
+  const NearBlocks& blocks_;
+  std::vector<int> joined_;  // nodes with halves, after these
+  std::vector<Box> box_;     // of each node
+  double rounding_ = 0;      // m
+};
+
+}  // namespace weft

@@ -59,6 +59,8 @@ Scene dressed_scene() {
   std::vector<double>& start = scene.sheets[1].start_positions;
   for (std::size_t i = 1; i < start.size(); i += 3) start[i] += 1e-3;
   scene.cloth_contact = true;
+  for (SheetDefinition& sheet : scene.sheets) sheet.textile.damping_ratio = 0.02;
+  scene.solver.step_bound = StepBound::kUnsheared;
   scene.dressing = {.close = 5e-4, .settle = 2.5e-4, .deflate = 1e-3, .holds = {{1, {0, 3}, 0}}};
   return scene;
 }

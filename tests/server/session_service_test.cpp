@@ -229,10 +229,8 @@ TEST(Accuracy, SetsWhatASceneLeavesOpenAndNothingElse) {
   EXPECT_TRUE(given.scene().sheets(0).bending().has_isometric());
 
   scene.mutable_dressing();
-  EXPECT_EQ(created(v1::ACCURACY_STANDARD).scene().solver().step_bound(),
-            v1::STEP_BOUND_UNSHEARED);
-  EXPECT_EQ(created(v1::ACCURACY_FINE).scene().solver().step_bound(),
-            v1::STEP_BOUND_EVERY_SHAPE);
+  EXPECT_EQ(created(v1::ACCURACY_STANDARD).scene().solver().step_bound(), v1::STEP_BOUND_UNSHEARED);
+  EXPECT_EQ(created(v1::ACCURACY_FINE).scene().solver().step_bound(), v1::STEP_BOUND_EVERY_SHAPE);
   scene.mutable_solver()->set_step_bound(v1::STEP_BOUND_EVERY_SHAPE);
   EXPECT_EQ(created(v1::ACCURACY_STANDARD).scene().solver().step_bound(),
             v1::STEP_BOUND_EVERY_SHAPE);

@@ -97,10 +97,8 @@ Finding finding_of(const Step& step, const std::set<std::string>& wanted,
     found.faults.insert(fault.code());
     found.text += (found.text.empty() ? "" : "; ") + fault.code() + ": " + fault.message();
   }
-  return {.line = step.line,
-          .name = "verdict",
-          .passed = found.faults == wanted,
-          .verdict = std::move(found)};
+  const bool passed = found.faults == wanted;
+  return {.line = step.line, .name = "verdict", .passed = passed, .verdict = std::move(found)};
 }
 
 class Performer {

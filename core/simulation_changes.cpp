@@ -140,12 +140,12 @@ void Simulation::State::shorten_step() {
     StepPlan& step = plan.step;
     const double bound = linear_bound(sheet.mesh, sheet.dynamics.inverse_mass,
                                       scene.solver.integrator, 0, sheet.good().x);
+    if (bound >= step.linear_bound) continue;
     const double gain = step.longest() / step.linear_bound;
     const double longest = scene.solver.safety * gain * bound;
     if (step.substep <= longest) continue;
     step.substeps = static_cast<std::int64_t>(std::ceil(scene.solver.frame_step / longest));
     step.substep = scene.solver.frame_step / static_cast<double>(step.substeps);
-    if (step.linear_bound <= bound) continue;
     step.linear_bound = bound;
     if (step.unsheared_bound > 0) step.unsheared_bound = gain * bound;
   }

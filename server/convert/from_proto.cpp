@@ -32,7 +32,6 @@ constexpr std::array<std::optional<Cut>, 6> kLabMeshes = {
 constexpr std::array kAccuracies = {Accuracy::kStandard, Accuracy::kDraft, Accuracy::kStandard,
                                     Accuracy::kFine};
 constexpr std::array kPrecisions = {Precision::kSingle, Precision::kSingle, Precision::kDouble};
-
 constexpr std::array kStepBounds = {StepBound::kEveryShape, StepBound::kEveryShape,
                                     StepBound::kUnsheared};
 

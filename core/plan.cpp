@@ -148,6 +148,16 @@ void describe_connections(const SheetDefinition& sheet, const Mesh& mesh, Plan& 
   }
 }
 
+// What frames show between the particles that are simulated costs who asks for them.
+void describe_interpolation(const SheetDefinition& sheet, Plan& plan) {
+  if (!is_interpolated(sheet.shape)) return;
+  const int all = particle_count(shown(sheet.shape)), simulated = sheet.particle_count();
+  plan.skipped.push_back(
+      {join(sheet.name, ": ", all - simulated, " of ", all, " particles"),
+       join("each row and column number ", std::get<Grid>(sheet.shape).simulated_every,
+            " is simulated, ", simulated, " particles; frames interpolate the others")});
+}
+
 void describe_forces(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan) {
   if (std::holds_alternative<Triangles>(sheet.shape) &&
       std::holds_alternative<Isometric>(sheet.bending))
@@ -390,7 +400,8 @@ void warn_of_start_inside(const Scene& scene, const std::vector<PlannedSheet>& p
         plan.warnings.push_back(
             {"STARTS_INSIDE", join("colliders[", c, "]"),
              join(std::ranges::count(inside, true), " particles of sheet \"", scene.sheets[s].name,
-                  "\" start inside, the first of them ", first - inside.begin(),
+                  "\" start inside, the first of them ",
+                  shown_particle(scene.sheets[s].shape, static_cast<int>(first - inside.begin())),
                   count_by_panel(scene.sheets[s].shape, inside), ": they are pushed out at ",
                   Contacts::kOutward, " m/s")});
     }
@@ -475,6 +486,7 @@ Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     plan.dampings.push_back(
         {scene.sheets[s].name, sheets[s].mesh.damping, steps[s].connection_ratio});
+    describe_interpolation(scene.sheets[s], plan);
     describe_solver(scene, scene.sheets[s], plan);
     describe_forces(scene.sheets[s], sheets[s].mesh, plan);
     describe_tethers(scene, s, sheets[s], plan);

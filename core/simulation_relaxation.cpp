@@ -4,6 +4,7 @@
 
 #include "core/lattice/coarser.h"
 #include "core/lattice/lattice.h"
+#include "core/lattice/shown.h"
 #include "core/model/strain.h"
 #include "core/simulation_state.h"
 

@@ -23,8 +23,11 @@ std::optional<double> seconds_of(const v1::Plan& plan, const v1::ServerStats& st
 
 std::string shape_text(const v1::Sheet& sheet) {
   if (sheet.has_grid()) {
-    return fmt::format("{} x {} particles, {:.4g} mm apart", sheet.grid().rows(),
-                       sheet.grid().columns(), sheet.grid().spacing_m() * 1e3);
+    const v1::Grid& grid = sheet.grid();
+    const std::string text = fmt::format("{} x {} particles, {:.4g} mm apart", grid.rows(),
+                                         grid.columns(), grid.spacing_m() * 1e3);
+    if (grid.simulated_every() <= 1) return text;
+    return text + fmt::format(", each {}. row and column simulated", grid.simulated_every());
   }
   const std::string& asset = sheet.triangles().asset();
   return asset.empty() ? "triangles" : "triangles of " + asset;

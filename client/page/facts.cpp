@@ -63,8 +63,12 @@ Rows shape_rows(const v1::SheetLayout& layout, const ClothMesh& mesh) {
 }
 
 Rows shape_rows(const v1::Grid& grid) {
-  return {{"particles", fmt::format("{} x {}", grid.rows(), grid.columns())},
-          {"spacing", value_text(1e3 * grid.spacing_m(), "mm")}};
+  Rows rows{{"particles", fmt::format("{} x {}", grid.rows(), grid.columns())},
+            {"spacing", value_text(1e3 * grid.spacing_m(), "mm")}};
+  if (grid.simulated_every() > 1)
+    rows.emplace_back("simulated", fmt::format("each {}. row and column, the others interpolated",
+                                               grid.simulated_every()));
+  return rows;
 }
 
 Rows textile_rows(const v1::Textile& textile) {

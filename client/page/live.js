@@ -220,12 +220,13 @@ class Live extends Stage {
 
   // ---- the hand
 
-  // The particle under the pointer, unless a body is before it; on the pattern too.
+  // The particle under the pointer that is simulated, unless a body is before it; on the pattern too.
   pick(event) {
     const found = this.find(event);
     if (!found) return undefined;
     const {pane, place: {triangle, weights}} = found;
-    const particle = pane.source.cloth.triangles[3 * triangle + weights.indexOf(Math.max(...weights))];
+    const particle = this.sight.simulated(
+      pane.source.cloth.triangles[3 * triangle + weights.indexOf(Math.max(...weights))]);
     return {particle, at: new THREE.Vector3().fromBufferAttribute(pane.position, particle)};
   }
 

@@ -110,6 +110,15 @@ class Sight {
     return this.sheets.find((sheet) => particle < sheet.first_particle + particlesOf(sheet));
   }
 
+  // The nearest particle that is simulated.
+  simulated(particle) {
+    const {first_particle, columns, simulated_every: every = 1} = this.sheetOf(particle);
+    if (every <= 1) return particle;
+    const own = particle - first_particle;
+    const nearest = (place) => every * Math.round(place / every);
+    return first_particle + nearest(Math.floor(own / columns)) * columns + nearest(own % columns);
+  }
+
   place() { return {frame: this.frame.number}; }
 
   // From x of all particles, then y, then z.

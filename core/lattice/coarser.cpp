@@ -1,11 +1,11 @@
 #include "core/lattice/coarser.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
 #include "core/lattice/lattice.h"
+#include "core/lattice/shown.h"
 
 namespace weft {
 namespace {
@@ -56,39 +56,6 @@ std::vector<Pin> coarser_pins(const std::vector<Pin>& pins, const Grid& from, co
   return {{std::move(held), {}}};
 }
 
-// Weights of the values at -1, 0, 1 and 2 for one at 0 <= t <= 1 (Catmull-Rom).
-std::array<double, 4> cubic(double t) {
-  return {((2 - t) * t - 1) * t / 2, ((3 * t - 5) * t * t + 2) / 2, ((4 - 3 * t) * t + 1) * t / 2,
-          (t - 1) * t * t / 2};
-}
-
-// Along one side: which values a particle is made of, and by what weights.
-struct Sample {
-  std::array<int, 4> at;
-  std::array<double, 4> weight;
-};
-std::vector<Sample> samples(int from, int to) {
-  std::vector<Sample> made;
-  for (int i = 0; i < to; ++i) {
-    const double place = static_cast<double>(i) * (from - 1) / (to - 1);
-    const int first = std::min(static_cast<int>(place), from - 2);
-    Sample sample{{first - 1, first, first + 1, first + 2}, cubic(place - first)};
-    auto& [at, weight] = sample;
-    if (at[0] < 0) {  // 2 x_0 - x_1
-      weight[1] += 2 * weight[0];
-      weight[2] -= weight[0];
-      weight[0] = at[0] = 0;
-    }
-    if (at[3] >= from) {
-      weight[2] += 2 * weight[3];
-      weight[1] -= weight[3];
-      weight[3] = at[3] = 0;
-    }
-    made.push_back(sample);
-  }
-  return made;
-}
-
 }  // namespace
 
 std::optional<Scene> coarser_scene(const Scene& scene, const std::vector<Matrix3Xd>& x,
@@ -114,27 +81,6 @@ std::optional<Scene> coarser_scene(const Scene& scene, const std::vector<Matrix3
     sheet.start_velocities.clear();
   }
   return coarser;
-}
-
-Matrix3Xd resample(const Matrix3Xd& values, const Grid& from, const Grid& to) {
-  const std::vector<Sample> columns = samples(from.columns, to.columns);
-  Matrix3Xd rows_kept(3, from.rows * to.columns);
-  for (int r = 0; r < from.rows; ++r)
-    for (int c = 0; c < to.columns; ++c) {
-      const auto& [at, weight] = columns[static_cast<std::size_t>(c)];
-      Vector3d sum = Vector3d::Zero();
-      for (std::size_t k = 0; k < 4; ++k) sum += weight[k] * values.col(r * from.columns + at[k]);
-      rows_kept.col(r * to.columns + c) = sum;
-    }
-  Matrix3Xd made(3, to.rows * to.columns);
-  int i = 0;
-  for (const auto& [at, weight] : samples(from.rows, to.rows))
-    for (int c = 0; c < to.columns; ++c) {
-      Vector3d sum = Vector3d::Zero();
-      for (std::size_t k = 0; k < 4; ++k) sum += weight[k] * rows_kept.col(at[k] * to.columns + c);
-      made.col(i++) = sum;
-    }
-  return made;
 }
 
 }  // namespace weft

@@ -16,8 +16,4 @@ namespace weft {
 std::optional<Scene> coarser_scene(const Scene& scene, const std::vector<Matrix3Xd>& x,
                                    double time);
 
-// Values of the particles of a grid at those of another that lies over it, bicubic; beyond the
-// border as straight as there. (3 x particles)
-Matrix3Xd resample(const Matrix3Xd& values, const Grid& from, const Grid& to);
-
 }  // namespace weft

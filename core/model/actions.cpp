@@ -46,10 +46,18 @@ class ActionList {
     if (action.kind == Kind::kMoveCollider) return move_collider(action);
     const auto sheet = index_of(context_.scene.sheets, action.name, ".sheet", "sheets");
     if (!sheet) return;
-    const int last = context_.scene.sheets[*sheet].particle_count() - 1;
+    const SheetShape& shape = context_.scene.sheets[*sheet].shape;
+    const int last = particle_count(shown(shape)) - 1;
     if (action.particle < 0 || action.particle > last)
       return problem(".particle", join(action.particle, " is not within 0 to ", last));
-    apply(action, *sheet);
+    const auto particle = simulated_particle(shape, action.particle);
+    if (!particle)
+      return problem(".particle",
+                     join(action.particle,
+                          " is not simulated, but lies between particles that are: "
+                          "those in each row and column number ",
+                          std::get<Grid>(shape).simulated_every, " from the first on"));
+    apply(action, *sheet, *particle);
   }
 
   std::vector<Problem> take() { return std::move(problems_); }
@@ -59,9 +67,8 @@ class ActionList {
     problems_.push_back({field_ + field, std::move(message)});
   }
 
-  void apply(const Action& action, std::size_t sheet) {
-    const int particle = action.particle;
-    const auto wrong = [&](const char* what) { problem(".particle", join(particle, what)); };
+  void apply(const Action& action, std::size_t sheet, int particle) {
+    const auto wrong = [&](const char* what) { problem(".particle", join(action.particle, what)); };
     const auto grip = find_grip(sheet, particle);
     const bool grabbed = grip != constraints_.grips.end();
     const auto holder = find_pin(sheet, particle);

@@ -27,7 +27,7 @@ struct Action {
   };
   Kind kind = Kind::kGrab;
   std::string name{};  // of the sheet, empty where there is one; of the collider
-  int particle = 0;    // index in the sheet
+  int particle = 0;    // index in what frames show of the sheet
   Vector3d target =
       Vector3d::Zero();              // of a particle; of a collider as an offset from its start, m
   std::optional<double> duration{};  // s; absent: a frame step, or longer for kMostSpeed

@@ -146,7 +146,8 @@ bool check_shape(const Grid& grid, const std::string& sheet, Check& check) {
   const std::string field = sheet + ".grid.";
   bool sized = check.number(field + "rows", grid.rows, 2, kMostRows, "");
   sized &= check.number(field + "columns", grid.columns, 2, kMostRows, "");
-  check.number(field + "spacing_m", grid.spacing, 1e-5, 10, "m");
+  const double given = grid.simulated_every > 1 ? grid.shown_spacing : grid.spacing;
+  check.number(field + "spacing_m", given, 1e-5, 10, "m");
   return sized;
 }
 

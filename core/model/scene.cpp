@@ -42,6 +42,10 @@ double end_of_untangling(const Scene& scene) {
 
 double most_thickness(const SheetDefinition& sheet) { return shortest_edge(sheet.shape) / 4; }
 
+double SheetDefinition::skin_or_default() const {
+  return skin.value_or(weft::spacing(shown(shape)) / 10);
+}
+
 double SheetDefinition::thickness_or_default() const {
   constexpr double kUsual = 2e-3;
   return thickness.value_or(std::min(kUsual, most_thickness(*this)));

@@ -73,7 +73,7 @@ struct SheetDefinition {
   std::vector<double> start_positions;             // (3 x particles) x, y, z of each, m; or empty
   std::vector<double> start_velocities;            // (3 x particles), m/s; or empty
   std::vector<Pin> pins;
-  std::optional<double> skin;  // m; absent: spacing / 10
+  std::optional<double> skin;  // m; absent: a tenth of the spacing that frames show
   // At which it keeps cloth away, its own and other sheets', m; absent: 2 mm, or as much as the
   // mesh allows.
   std::optional<double> thickness;
@@ -82,9 +82,9 @@ struct SheetDefinition {
   std::optional<double> tether_stretch;
 
   int particle_count() const { return weft::particle_count(shape); }
-  double spacing() const { return weft::spacing(shape); }                   // m
-  double skin_or_default() const { return skin.value_or(spacing() / 10); }  // m
-  double thickness_or_default() const;                                      // m
+  double spacing() const { return weft::spacing(shape); }  // m
+  double skin_or_default() const;                          // m
+  double thickness_or_default() const;                     // m
 };
 
 struct Plane {

@@ -31,6 +31,11 @@ std::vector<std::array<int, 3>> triangles_in(const Grid& grid) {
   return triangles;
 }
 
+Grid shown_grid(const Grid& grid) {
+  const int every = grid.simulated_every;
+  return {(grid.rows - 1) * every + 1, (grid.columns - 1) * every + 1, grid.shown_spacing};
+}
+
 int particle_count_of(const Triangles& mesh) { return static_cast<int>(mesh->start.size()); }
 double spacing_of(const Triangles& mesh) { return mesh->spacing; }
 double shortest_edge_of(const Triangles& mesh) {
@@ -133,6 +138,31 @@ double spacing(const SheetShape& shape) {
 
 double shortest_edge(const SheetShape& shape) {
   return std::visit([](const auto& each) { return shortest_edge_of(each); }, shape);
+}
+
+bool is_interpolated(const SheetShape& shape) {
+  const auto* grid = std::get_if<Grid>(&shape);
+  return grid != nullptr && grid->simulated_every > 1;
+}
+
+SheetShape shown(const SheetShape& shape) {
+  return is_interpolated(shape) ? shown_grid(std::get<Grid>(shape)) : shape;
+}
+
+int shown_particle(const SheetShape& shape, int simulated) {
+  if (!is_interpolated(shape)) return simulated;
+  const Grid& grid = std::get<Grid>(shape);
+  const int row = simulated / grid.columns, column = simulated % grid.columns;
+  return (row * shown_grid(grid).columns + column) * grid.simulated_every;
+}
+
+std::optional<int> simulated_particle(const SheetShape& shape, int shown) {
+  if (!is_interpolated(shape)) return shown;
+  const Grid& grid = std::get<Grid>(shape);
+  const int every = grid.simulated_every, columns = shown_grid(grid).columns;
+  const int row = shown / columns, column = shown % columns;
+  if (row % every != 0 || column % every != 0) return std::nullopt;
+  return row / every * grid.columns + column / every;
 }
 
 Extent extent(const SheetShape& shape) {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -17,6 +18,10 @@ struct Grid {
   int rows = 2;
   int columns = 2;
   double spacing = 0;  // h, m
+  // Frames show a finer grid, of which each so many-th row and column is one of these; what lies
+  // between follows from them (core/lattice/shown.h).
+  int simulated_every = 1;
+  double shown_spacing = 0;  // where that is more than 1, m
 };
 
 // Triangles cut out of one piece.
@@ -72,6 +77,15 @@ struct Extent {
   double warp = 0, weft = 0;
 };
 Extent extent(const SheetShape& shape);
+
+// Whether frames show more particles of it than are simulated.
+bool is_interpolated(const SheetShape& shape);
+// As frames show it.
+SheetShape shown(const SheetShape& shape);
+// Index of a particle in what frames show, and of a shown one in what is simulated; none where it
+// lies between these.
+int shown_particle(const SheetShape& shape, int simulated);
+std::optional<int> simulated_particle(const SheetShape& shape, int shown);
 
 // Of a particle before the sheet is placed, m.
 Vector3d local_position(const SheetShape& shape, int particle);

@@ -98,6 +98,12 @@ class Reader {
   }
 
   SheetDefinition sheet(const v1::Sheet& from, const std::string& field);
+  Grid grid(const v1::Grid& from, const std::string& field);
+  void simulate(const SheetShape& shape, const std::string& field, const char* how,
+                std::set<int>& taken, std::vector<int>& particles);
+  template <class Values>
+  std::vector<double> start_values(const Values& from, const std::string& field, double most,
+                                   const char* unit, const SheetShape& shape);
   void set_shape(const v1::Sheet& from, const std::string& field, SheetDefinition& sheet);
   BendingLaw bending(const v1::BendingLaw& from, const std::string& field);
   MeasuredTextile preset(const std::string& name, const std::string& field);
@@ -154,11 +160,16 @@ SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
                                          : default_bending(accuracy_);
   sheet.origin = vector(from.placement().origin_m());
   sheet.rotation = rotation(from.placement());
-  sheet.start_positions = {from.start_positions_m().begin(), from.start_positions_m().end()};
-  sheet.start_velocities = {from.start_velocities_m_per_s().begin(),
-                            from.start_velocities_m_per_s().end()};
-  for (const auto& pin : from.pins()) {
-    sheet.pins.push_back(to_pin(pin));
+  sheet.start_positions =
+      start_values(from.start_positions_m(), field + ".start_positions_m", 1e4, "m", sheet.shape);
+  sheet.start_velocities =
+      start_values(from.start_velocities_m_per_s(), field + ".start_velocities_m_per_s", 1000,
+                   "m/s", sheet.shape);
+  std::set<int> pinned;
+  for (int p = 0; p < from.pins_size(); ++p) {
+    sheet.pins.push_back(to_pin(from.pins(p)));
+    simulate(sheet.shape, at(field + ".pins", p) + ".particles", "pinned", pinned,
+             sheet.pins.back().particles);
   }
   if (from.has_skin_m()) sheet.skin = from.skin_m();
   if (from.has_thickness_m()) sheet.thickness = from.thickness_m();
@@ -167,7 +178,7 @@ SheetDefinition Reader::sheet(const v1::Sheet& from, const std::string& field) {
 }
 
 void Reader::set_shape(const v1::Sheet& from, const std::string& field, SheetDefinition& sheet) {
-  sheet.shape = Grid{from.grid().rows(), from.grid().columns(), from.grid().spacing_m()};
+  sheet.shape = grid(from.grid(), field + ".grid");
   if (from.has_grid()) return;
   if (!from.has_triangles()) return missing(field + ".mesh", "grid or triangles", field + ".grid.");
   // a grid stands in for what is faulty
@@ -189,6 +200,82 @@ void Reader::set_shape(const v1::Sheet& from, const std::string& field, SheetDef
     if (data->panels(p).has_textile())
       sheet.panel_textiles.push_back(
           {p, textile(data->panels(p).textile(), at(path + ".panels", p) + ".textile")});
+}
+
+Grid Reader::grid(const v1::Grid& from, const std::string& field) {
+  constexpr int kMostEvery = 64, kMost = 4096;
+  Grid grid{from.rows(), from.columns(), from.spacing_m()};
+  if (!from.has_simulated_every() || from.simulated_every() == 1) return grid;
+  const int every = from.simulated_every();
+  if (every < 1 || every > kMostEvery) {
+    problem(field + ".simulated_every", join(every, " is not within 1 to ", kMostEvery));
+    return grid;
+  }
+  const auto simulated = [&](int count, const char* side) {
+    if (count >= 2 && count <= kMost && (count - 1) % every != 0)
+      problem(field + ".simulated_every",
+              join("is ", every, ", of which ", side, " - 1 = ", count - 1, " is no multiple"));
+    return count < 2 || count > kMost ? count : (count - 1) / every + 1;
+  };
+  grid.rows = simulated(from.rows(), "rows");
+  grid.columns = simulated(from.columns(), "columns");
+  grid.simulated_every = every;
+  grid.shown_spacing = from.spacing_m();
+  grid.spacing *= every;
+  return grid;
+}
+
+// Leaves those that are simulated, with their indices among these. how: "pinned"; taken: those
+// that are already.
+void Reader::simulate(const SheetShape& shape, const std::string& field, const char* how,
+                      std::set<int>& taken, std::vector<int>& particles) {
+  if (!is_interpolated(shape) || particles.empty()) return;
+  const int last = particle_count(shown(shape)) - 1;
+  std::vector<int> kept;
+  bool sound = true;
+  for (std::size_t k = 0; k < particles.size(); ++k) {
+    const bool within = particles[k] >= 0 && particles[k] <= last;
+    if (within && taken.insert(particles[k]).second) {
+      if (const auto simulated = simulated_particle(shape, particles[k]))
+        kept.push_back(*simulated);
+      continue;
+    }
+    problem(at(field, static_cast<int>(k)), within
+                                                ? join(particles[k], " is ", how, " twice")
+                                                : join(particles[k], " is not within 0 to ", last));
+    sound = false;
+  }
+  if (sound && kept.empty())
+    problem(field, join("has none that is simulated: those in each row and column number ",
+                        std::get<Grid>(shape).simulated_every, " from the first on are"));
+  if (kept.empty()) stand_ins_.push_back(field);
+  particles = std::move(kept);
+}
+
+// Three of each particle that is simulated.
+template <class Values>
+std::vector<double> Reader::start_values(const Values& from, const std::string& field, double most,
+                                         const char* unit, const SheetShape& shape) {
+  std::vector<double> values(from.begin(), from.end());
+  if (!is_interpolated(shape) || values.empty()) return values;
+  const auto all = 3 * static_cast<std::size_t>(particle_count(shown(shape)));
+  if (values.size() != all) {
+    problem(field,
+            join("has ", values.size(), " values; ", all, " (3 x particles) or none are needed"));
+    return {};
+  }
+  for (std::size_t i = 0; i < all; ++i) {
+    if (std::abs(values[i]) <= most) continue;
+    problem(at(field, static_cast<int>(i)),
+            join(values[i], " ", unit, " is not within ", -most, " to ", most, " ", unit));
+    return {};
+  }
+  std::vector<double> kept;
+  for (int i = 0; i < particle_count(shape); ++i) {
+    const auto first = values.begin() + 3 * shown_particle(shape, i);
+    kept.insert(kept.end(), first, first + 3);
+  }
+  return kept;
 }
 
 // nullptr where there is none, which is said.
@@ -366,6 +453,8 @@ Dressing Reader::dressing(const v1::Dressing& from, const std::vector<SheetDefin
     });
     if (named != sheets.end()) {
       hold.sheet = static_cast<int>(named - sheets.begin());
+      std::set<int> held;
+      simulate(named->shape, at("dressing.holds", h) + ".particles", "held", held, hold.particles);
     } else if (!given.sheet().empty() || sheets.size() != 1) {
       problem(field, given.sheet().empty() ? "is absent, and the scene has " +
                                                  std::to_string(sheets.size()) + " sheets"

@@ -1,5 +1,6 @@
 #include <google/protobuf/util/time_util.h>
 
+#include "core/lattice/shown.h"
 #include "server/convert/convert.h"
 #include "server/convert/names.h"
 
@@ -84,10 +85,26 @@ void set(v1::Textile* to, const RawTextile& from) {
   raw->set_air_drag_kg_per_s(from.air_drag);
 }
 
-void set(v1::Sheet* to, const Grid& grid) {
+void set(v1::Sheet* to, const Grid& simulated) {
+  const Grid grid = std::get<Grid>(shown(simulated));
   to->mutable_grid()->set_rows(grid.rows);
   to->mutable_grid()->set_columns(grid.columns);
   to->mutable_grid()->set_spacing_m(grid.spacing);
+  to->mutable_grid()->set_simulated_every(simulated.simulated_every);
+}
+
+// Those of particles that are simulated.
+void show(const SheetShape& shape, google::protobuf::RepeatedField<std::int32_t>& particles) {
+  for (std::int32_t& particle : particles) particle = shown_particle(shape, particle);
+}
+
+// values: of each particle that is simulated x, y, z.
+void add(google::protobuf::RepeatedField<double>* to, const std::vector<double>& values,
+         const SheetShape& shape) {
+  if (!is_interpolated(shape) || values.empty()) return to->Add(values.begin(), values.end());
+  const Eigen::Map<const Matrix3Xd> simulated(values.data(), 3, particle_count(shape));
+  const Matrix3Xd all = resample(simulated, std::get<Grid>(shape), std::get<Grid>(shown(shape)));
+  to->Add(all.data(), all.data() + all.size());
 }
 
 void set(v1::Sheet* to, const SheetDefinition& from, const Textile& textile,
@@ -102,11 +119,14 @@ void set(v1::Sheet* to, const SheetDefinition& from, const Textile& textile,
   set(to->mutable_placement()->mutable_origin_m(), from.origin);
   set(to->mutable_placement()->mutable_rotation(), from.rotation);
   if (start_values == StartValues::kIncluded) {
-    to->mutable_start_positions_m()->Add(from.start_positions.begin(), from.start_positions.end());
-    to->mutable_start_velocities_m_per_s()->Add(from.start_velocities.begin(),
-                                                from.start_velocities.end());
+    add(to->mutable_start_positions_m(), from.start_positions, from.shape);
+    add(to->mutable_start_velocities_m_per_s(), from.start_velocities, from.shape);
   }
-  for (const auto& pin : from.pins) *to->add_pins() = to_proto(pin);
+  for (const auto& pin : from.pins) {
+    v1::Pin* added = to->add_pins();
+    *added = to_proto(pin);
+    show(from.shape, *added->mutable_particles());
+  }
   to->set_skin_m(from.skin_or_default());
   to->set_thickness_m(from.thickness_or_default());
   if (from.tether_stretch) to->set_tether_stretch(*from.tether_stretch);
@@ -144,8 +164,10 @@ void set(v1::Dressing* to, const Dressing& from, const std::vector<SheetDefiniti
   to->set_deflate_m(from.deflate);
   for (const Hold& hold : from.holds) {
     v1::Hold* added = to->add_holds();
-    added->set_sheet(sheets[static_cast<std::size_t>(hold.sheet)].name);
+    const SheetDefinition& sheet = sheets[static_cast<std::size_t>(hold.sheet)];
+    added->set_sheet(sheet.name);
     added->mutable_particles()->Add(hold.particles.begin(), hold.particles.end());
+    show(sheet.shape, *added->mutable_particles());
     added->set_until_s(hold.until);
   }
 }

@@ -26,8 +26,9 @@ std::int64_t particles_of(const v1::Scene& scene) {
   std::int64_t particles = 0;
   for (const auto& sheet : scene.sheets()) {
     const std::int64_t rows = sheet.grid().rows(), columns = sheet.grid().columns();
+    const std::int64_t every = std::max(1, sheet.grid().simulated_every());
     if (std::min(rows, columns) > 0 && std::max(rows, columns) <= kMostRows)
-      particles += rows * columns;
+      particles += ((rows - 1) / every + 1) * ((columns - 1) / every + 1);
     particles += weft::particles_of(sheet.triangles().data());
   }
   return particles;
@@ -43,9 +44,10 @@ bool is_large(const v1::Scene& scene) {
          large(scene.colliders(), [](const v1::Collider& collider) { return collider.has_mesh(); });
 }
 
-std::int64_t particles_of(const Scene& scene) {
+// With those that frames interpolate.
+std::int64_t shown_particles_of(const Scene& scene) {
   std::int64_t particles = 0;
-  for (const SheetDefinition& sheet : scene.sheets) particles += sheet.particle_count();
+  for (const SheetDefinition& sheet : scene.sheets) particles += particle_count(shown(sheet.shape));
   return particles;
 }
 
@@ -213,7 +215,7 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
   }
   Scene& scene = std::get<Scene>(converted);
   const auto fresh = name_meshes(request.session().scene(), scene);
-  const std::int64_t particles = particles_of(scene);
+  const std::int64_t particles = shown_particles_of(scene);
   if (particles > backend_.limits.max_particles_per_session) {
     return errors::exhausted("particles_per_session",
                              "the scene has " + std::to_string(particles) +

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "core/lattice/shown.h"
 #include "server/convert/convert.h"
 #include "server/convert/names.h"
 #include "server/convert/numerics.h"
@@ -60,7 +61,11 @@ grpc::Status FrameCall::take(const FoundSession& found, const std::string& uid,
   if (!uid.empty() && uid != session_->uid()) {
     return errors::uid_changed(session_->uid());
   }
-  const auto particles = static_cast<std::int64_t>(session_->status().newest->positions.size()) / 3;
+  std::int64_t particles = 0;
+  for (const auto& sheet : session_->scene().sheets) {
+    order_.sheets.push_back(sheet.shape);
+    particles += particle_count(shown(sheet.shape));
+  }
   for (auto& problem : find_problems(order_.format, particles)) {
     problems.push_back(std::move(problem));
   }
@@ -68,7 +73,6 @@ grpc::Status FrameCall::take(const FoundSession& found, const std::string& uid,
     problems.push_back({"format.clearance", "the scene has no collider"});
   if (!problems.empty()) return errors::field_invalid(problems);
   order_.format = with_defaults(order_.format);
-  for (const auto& sheet : session_->scene().sheets) order_.sheets.push_back(sheet.shape);
   order_.most_bytes = backend_.limits.max_frame_bytes;
   return open();
 }
@@ -184,18 +188,20 @@ void FrameCall::write_header() {
     v1::SheetLayout* layout = header->add_sheets();
     layout->set_name(sheet.name);
     layout->set_first_particle(first_particle);
-    if (const auto* grid = std::get_if<Grid>(&sheet.shape)) {
+    const SheetShape shape = shown(sheet.shape);
+    if (const auto* grid = std::get_if<Grid>(&shape)) {
       layout->set_rows(grid->rows);
       layout->set_columns(grid->columns);
+      layout->set_simulated_every(std::get<Grid>(sheet.shape).simulated_every);
     }
-    layout->set_particle_count(sheet.particle_count());
-    layout->set_triangle_count(triangle_count(sheet.shape));
-    first_particle += sheet.particle_count();
+    layout->set_particle_count(particle_count(shape));
+    layout->set_triangle_count(triangle_count(shape));
+    first_particle += layout->particle_count();
   }
   *header->mutable_format() = order_.format;
   header->set_start_frame(subscription_->next_frame());
   if (order_.format.topology())
-    topology_ = encoded_topology(order_.sheets, backend_.limits.max_frame_bytes);
+    topology_ = encoded_topology(shown(order_.sheets), backend_.limits.max_frame_bytes);
   write(encoded(message));
 }
 

@@ -6,12 +6,14 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <list>
 #include <memory>
 #include <new>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/lattice/shown.h"
 #include "core/model/normals.h"
 #include "core/model/strain.h"
 #include "core/model/text.h"
@@ -110,7 +112,8 @@ std::string bytes_of(const std::vector<double>& values, std::size_t planes,
 
 constexpr double kPressureSteps = 1000;  // of the grid step in m, each of 1 Pa
 
-// The values of a frame's particles that are asked for: planes of them, one after the other.
+// The values of a frame's particles that are asked for, of all that are shown: planes of them, one
+// after the other.
 class ParticleArrays {
  public:
   ParticleArrays(const v1::FrameFormat& format, std::int64_t particles)
@@ -127,6 +130,29 @@ class ParticleArrays {
   const v1::FrameFormat& format_;
   std::int64_t particles_;
   Selection wanted_;
+};
+
+// The values of a frame as they are shown; where that is as they are simulated, without a copy.
+class Interpolated {
+ public:
+  explicit Interpolated(const std::vector<SheetShape>& sheets)
+      : sheets_(sheets), differs_(std::any_of(sheets.begin(), sheets.end(), is_interpolated)) {}
+
+  const std::vector<double>& of(const std::vector<double>& values) {
+    return differs_ ? made_.emplace_back(shown_values(values, sheets_)) : values;
+  }
+  // A curve through pressures may swing below 0.
+  std::vector<double> of_pressures(std::vector<double> values) const {
+    if (!differs_) return values;
+    values = shown_values(values, sheets_);
+    for (double& value : values) value = std::max(value, 0.0);
+    return values;
+  }
+
+ private:
+  const std::vector<SheetShape>& sheets_;
+  bool differs_;
+  std::list<std::vector<double>> made_;
 };
 
 // Their arrays, joined, are the frame's.
@@ -211,16 +237,19 @@ std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order) {
   v1::Frame message;
   message.set_number(frame.number);
   message.set_time_s(frame.time);
-  const ParticleArrays arrays(format, std::ssize(frame.positions) / 3);
-  message.set_positions_m(arrays.bytes(frame.positions));
-  if (format.velocities()) message.set_velocities_m_per_s(arrays.bytes(frame.velocities));
-  if (format.normals())
-    message.set_normals(arrays.bytes(normals_of(frame.positions, order.sheets)));
+  const std::vector<SheetShape> sheets = shown(order.sheets);
+  Interpolated values(order.sheets);
+  const std::vector<double>& x = values.of(frame.positions);
+  const ParticleArrays arrays(format, std::ssize(x) / 3);
+  message.set_positions_m(arrays.bytes(x));
+  if (format.velocities())
+    message.set_velocities_m_per_s(arrays.bytes(values.of(frame.velocities)));
+  if (format.normals()) message.set_normals(arrays.bytes(normals_of(x, sheets)));
   if (format.strain())
-    message.set_strain(bytes_of(strains_of(frame.positions, order.sheets), 3, format.encoding(),
-                                format.grid_step_m()));
-  if (format.pressure()) message.set_pressure_pa(arrays.bytes(pressures_of(frame), kPressureSteps));
-  if (format.clearance()) message.set_clearance_m(arrays.bytes(clearances_of(frame)));
+    message.set_strain(bytes_of(strains_of(x, sheets), 3, format.encoding(), format.grid_step_m()));
+  if (format.pressure())
+    message.set_pressure_pa(arrays.bytes(values.of_pressures(pressures_of(frame)), kPressureSteps));
+  if (format.clearance()) message.set_clearance_m(arrays.bytes(clearances_of(frame, x)));
   if (format.stats()) {
     v1::FrameStats* stats = message.mutable_stats();
     const Deformation deformation = deformation_of(frame);

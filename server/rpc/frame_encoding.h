@@ -21,9 +21,9 @@ std::vector<Problem> find_problems(const v1::FrameFormat& format, std::int64_t p
 
 // How frames of a session are sent.
 struct FrameOrder {
-  v1::FrameFormat format = {};  // with its defaults filled in and no problems
-  std::vector<SheetShape> sheets = {};
-  std::int64_t most_bytes = 0;  // of a message; 1024 at least
+  v1::FrameFormat format = {};          // with its defaults filled in and no problems
+  std::vector<SheetShape> sheets = {};  // as they are simulated
+  std::int64_t most_bytes = 0;          // of a message; 1024 at least
 };
 
 // The frame, in several parts where it is too large for a message.

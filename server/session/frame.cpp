@@ -32,9 +32,9 @@ std::vector<double> pressures_of(const Frame& frame) {
   return frame.meter->pressures(frame.scene, frame.positions, frame.time);
 }
 
-std::vector<double> clearances_of(const Frame& frame) {
+std::vector<double> clearances_of(const Frame& frame, const std::vector<double>& shown) {
   if (!frame.meter) return frame.clearances;
-  return frame.meter->clearances(frame.scene, frame.positions, frame.time);
+  return frame.meter->clearances(frame.scene, shown, frame.time);
 }
 
 }  // namespace weft

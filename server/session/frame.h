@@ -41,7 +41,8 @@ class EncodingCache {
 // The state of a session at one time. Never changes once it is published.
 struct Frame {
   std::int64_t number = 0;
-  double time = 0;                         // s
+  double time = 0;  // s
+  // Of particles that are simulated, and not interpolated; so is what follows.
   std::vector<double> positions;           // (3 x particles) planes x, y, z, m
   std::vector<double> velocities;          // (3 x particles) planes x, y, z, m/s
   double kinetic_energy = 0;               // J
@@ -68,6 +69,7 @@ struct Frame {
 // As they came with the frame, or computed now.
 Deformation deformation_of(const Frame& frame);
 std::vector<double> pressures_of(const Frame& frame);
-std::vector<double> clearances_of(const Frame& frame);
+// shown: positions of all particles that are shown, planes x, y, z, m.
+std::vector<double> clearances_of(const Frame& frame, const std::vector<double>& shown);
 
 }  // namespace weft

@@ -14,10 +14,9 @@ namespace weft::testing {
 namespace {
 
 const Action kRelax{.kind = Action::Kind::kRelax};
-constexpr double kGravity = 9.80665;
 
 // A square of 1 m, of a textile that is soft to the hand and hardly stretches.
-SheetDefinition square(int side) {
+SheetDefinition square_of(int side) {
   SheetDefinition sheet = flat_sheet(side, side, 1.0 / (side - 1));
   sheet.textile = {.model = MeasuredTextile{.areal_density = 0.2,
                                             .tensile_warp = 500,
@@ -33,7 +32,7 @@ SheetDefinition square(int side) {
 // By two corners.
 Scene hung(int side) {
   Scene scene;
-  scene.sheets = {square(side)};
+  scene.sheets = {square_of(side)};
   scene.sheets[0].pins = {{{0, side - 1}, {}}};
   return scene;
 }
@@ -65,14 +64,14 @@ TEST(Relaxation, EndsWhereTheForcesOfTheEquationsAreNoMoreThanAThousandthOfTheWe
 
   const Mesh mesh = make_mesh(scene.sheets[0]);
   const Matrix3Xd x = positions(simulation);
-  Matrix3Xd force = Vector3d(0, -kGravity, 0) * mesh.mass.transpose();
+  Matrix3Xd force = Vector3d(0, -kStandardGravity, 0) * mesh.mass.transpose();
   add_elastic_forces(mesh, x, Matrix3Xd::Zero(3, x.cols()), force);
   force.col(0).setZero();
   force.col(30).setZero();
   Vector3d sum = Vector3d::Zero();
   for (const auto& f : force.colwise()) sum += f;
   // single particles swing about their place without end; all of them together hang still
-  EXPECT_LT(sum.norm(), 0.03 * 0.2 * kGravity);
+  EXPECT_LT(sum.norm(), 0.03 * 0.2 * kStandardGravity);
 }
 
 TEST(Relaxation, ComesToAPlaceThatTheMotionStaysAt) {
@@ -91,7 +90,7 @@ TEST(Relaxation, AStripHungByItsEndsIsACatenary) {
   constexpr int kColumns = 61;
   Scene scene;
   SheetDefinition strip = flat_sheet(3, kColumns, 1.0 / (kColumns - 1));
-  strip.textile = square(3).textile;
+  strip.textile = square_of(3).textile;
   strip.bending = Isometric{};
   const Path inward = {{0, {0, 0, 0}}, {0.5, {0.1, 0, 0}}},
              outward = {{0, {0, 0, 0}}, {0.5, {-0.1, 0, 0}}};
@@ -244,7 +243,7 @@ TEST(Relaxation, TrianglesAndClothOnABodyComeToRestToo) {
   for (const Vector2d& flat : mesh.flat) mesh.start.emplace_back(flat.x(), 0.101, flat.y());
   SheetDefinition sheet;
   sheet.shape = complete(mesh);
-  sheet.textile = square(3).textile;
+  sheet.textile = square_of(3).textile;
   sheet.bending = Isometric{};
   Scene scene;
   scene.sheets = {sheet};
@@ -296,20 +295,6 @@ TEST(CoarserLattice, CoversSheetsWhoseSidesAreNoMultiples) {
     EXPECT_NEAR(grid.spacing * (grid.rows - 1), 0.01 * (rows - 1), 0.01 * 0.01 * rows);
     EXPECT_NEAR(grid.spacing * (grid.columns - 1), 0.01 * (columns - 1), 0.01 * 0.01 * columns);
   }
-}
-
-TEST(CoarserLattice, ValuesThatAreLinearInThePlaceAreResampledExactly) {
-  const Grid from{5, 7, 0.1}, to{23, 11, 0.1};
-  const auto field = [](const Grid& grid) {
-    Matrix3Xd values(3, grid.rows * grid.columns);
-    for (int i = 0; i < values.cols(); ++i) {
-      const double u = static_cast<double>(i % grid.columns) / (grid.columns - 1);
-      const double v = static_cast<double>(i / grid.columns) / (grid.rows - 1);
-      values.col(i) = Vector3d(1 + u, 2 * v - u, 3);
-    }
-    return values;
-  };
-  EXPECT_LT((resample(field(from), from, to) - field(to)).cwiseAbs().maxCoeff(), 1e-12);
 }
 
 }  // namespace

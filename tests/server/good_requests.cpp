@@ -105,6 +105,7 @@ v1::Scene full_scene() {
   uploaded->mutable_triangles()->set_asset(name_of_asset(known_asset()));
   v1::Sheet* preset = scene.add_sheets();
   *preset->mutable_grid() = sheet->grid();
+  preset->mutable_grid()->set_simulated_every(1);
   preset->mutable_textile()->set_preset("denim_11oz");
 
   v1::Plane* plane = scene.add_colliders()->mutable_plane();

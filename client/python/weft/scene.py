@@ -80,12 +80,14 @@ class Textile(Value):
 @dataclass(eq=False)
 class Grid(Value):
     """A lattice of rows x columns particles: (r, c) has index r x columns + c, and starts at
-    x = c spacing (along the warp), z = r spacing."""
+    x = c spacing (along the warp), z = r spacing. Of rows and columns each so many-th is simulated,
+    and what lies between interpolated."""
 
     message = scene_pb2.Grid
     rows: int
     columns: int
     spacing_m: float
+    simulated_every: int = 1
 
 
 @dataclass(eq=False)
@@ -249,7 +251,7 @@ class Sheet(Value):
     start_positions_m and start_velocities_m_per_s are (n, 3), m and m/s.
 
     >>> Sheet.grid(31, 31, spacing_m=1 / 30, textile=Textile.preset("wool_tropical")).shape
-    Grid(rows=31, columns=31, spacing_m=0.03333333333333333)
+    Grid(rows=31, columns=31, spacing_m=0.03333333333333333, simulated_every=1)
     """
 
     message = scene_pb2.Sheet

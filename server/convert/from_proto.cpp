@@ -203,26 +203,22 @@ void Reader::set_shape(const v1::Sheet& from, const std::string& field, SheetDef
 }
 
 Grid Reader::grid(const v1::Grid& from, const std::string& field) {
-  constexpr int kMostEvery = 64, kMost = 4096;
-  Grid grid{from.rows(), from.columns(), from.spacing_m()};
-  if (!from.has_simulated_every() || from.simulated_every() == 1) return grid;
-  const int every = from.simulated_every();
-  if (every < 1 || every > kMostEvery) {
+  constexpr int kMostEvery = 64, kMostRows = 4096;
+  const Grid all{from.rows(), from.columns(), from.spacing_m()};
+  const int every = from.has_simulated_every() ? from.simulated_every() : 1;
+  if (every < 1 || every > kMostEvery)
     problem(field + ".simulated_every", join(every, " is not within 1 to ", kMostEvery));
-    return grid;
-  }
-  const auto simulated = [&](int count, const char* side) {
-    if (count >= 2 && count <= kMost && (count - 1) % every != 0)
-      problem(field + ".simulated_every",
-              join("is ", every, ", of which ", side, " - 1 = ", count - 1, " is no multiple"));
-    return count < 2 || count > kMost ? count : (count - 1) / every + 1;
+  const auto [least, most] = std::minmax(all.rows, all.columns);
+  if (every <= 1 || every > kMostEvery || least < 2 || most > kMostRows) return all;
+  const auto divides = [&](int cells, const char* side) {
+    if (cells % every == 0) return true;
+    problem(field + ".simulated_every",
+            join("is ", every, ", of which ", side, " - 1 = ", cells, " is no multiple"));
+    return false;
   };
-  grid.rows = simulated(from.rows(), "rows");
-  grid.columns = simulated(from.columns(), "columns");
-  grid.simulated_every = every;
-  grid.shown_spacing = from.spacing_m();
-  grid.spacing *= every;
-  return grid;
+  const int rows = all.rows - 1, columns = all.columns - 1;
+  if (!divides(rows, "rows") || !divides(columns, "columns")) return all;
+  return {rows / every + 1, columns / every + 1, every * all.spacing, every, all.spacing};
 }
 
 // Leaves those that are simulated, with their indices among these. how: "pinned"; taken: those

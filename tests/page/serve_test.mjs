@@ -319,6 +319,22 @@ test('on a phone everything fits the width, and a finger drags the cloth', async
   await close();
 });
 
+test('a hand takes the nearest particle that is simulated', async () => {
+  weft('scene', 'new', '--template', 'hang', '--textile', 'wool_tropical', '--rows', '25', '--columns', '25',
+    '--set', 'sheets[0].grid.simulated_every=4', '-o', file('smooth.json'));
+  weft('session', 'create', file('smooth.json'), '--id', 'smooth');
+  const {page, close} = await open('smooth');
+  const {x, y, width, height} = await page.locator('#view').boundingBox();
+  await page.mouse.move(x + width / 2 + 7, y + 0.4 * height + 5);
+  await page.mouse.down();
+  await says(page, 'doing', /Leads particle/);
+  const particle = Number((await page.textContent('#doing')).match(/particle (\d+)/)[1]);
+  assert.deepEqual([Math.floor(particle / 25) % 4, particle % 25 % 4], [0, 0]);
+  await page.mouse.up();
+  await says(page, 'doing', /Let go/);
+  await close();
+});
+
 test('a hand lets go when its page is closed', async () => {
   const {page, close} = await open('curtain');
   await play(page);

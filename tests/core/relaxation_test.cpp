@@ -14,10 +14,10 @@ namespace weft::testing {
 namespace {
 
 const Action kRelax{.kind = Action::Kind::kRelax};
-constexpr double kGravity = 9.80665;
+constexpr double kWeightOfKilogram = 9.80665;
 
 // A square of 1 m, of a textile that is soft to the hand and hardly stretches.
-SheetDefinition square(int side) {
+SheetDefinition square_sheet(int side) {
   SheetDefinition sheet = flat_sheet(side, side, 1.0 / (side - 1));
   sheet.textile = {.model = MeasuredTextile{.areal_density = 0.2,
                                             .tensile_warp = 500,
@@ -33,7 +33,7 @@ SheetDefinition square(int side) {
 // By two corners.
 Scene hung(int side) {
   Scene scene;
-  scene.sheets = {square(side)};
+  scene.sheets = {square_sheet(side)};
   scene.sheets[0].pins = {{{0, side - 1}, {}}};
   return scene;
 }
@@ -65,14 +65,14 @@ TEST(Relaxation, EndsWhereTheForcesOfTheEquationsAreNoMoreThanAThousandthOfTheWe
 
   const Mesh mesh = make_mesh(scene.sheets[0]);
   const Matrix3Xd x = positions(simulation);
-  Matrix3Xd force = Vector3d(0, -kGravity, 0) * mesh.mass.transpose();
+  Matrix3Xd force = Vector3d(0, -kWeightOfKilogram, 0) * mesh.mass.transpose();
   add_elastic_forces(mesh, x, Matrix3Xd::Zero(3, x.cols()), force);
   force.col(0).setZero();
   force.col(30).setZero();
   Vector3d sum = Vector3d::Zero();
   for (const auto& f : force.colwise()) sum += f;
   // single particles swing about their place without end; all of them together hang still
-  EXPECT_LT(sum.norm(), 0.03 * 0.2 * kGravity);
+  EXPECT_LT(sum.norm(), 0.03 * 0.2 * kWeightOfKilogram);
 }
 
 TEST(Relaxation, ComesToAPlaceThatTheMotionStaysAt) {
@@ -91,7 +91,7 @@ TEST(Relaxation, AStripHungByItsEndsIsACatenary) {
   constexpr int kColumns = 61;
   Scene scene;
   SheetDefinition strip = flat_sheet(3, kColumns, 1.0 / (kColumns - 1));
-  strip.textile = square(3).textile;
+  strip.textile = square_sheet(3).textile;
   strip.bending = Isometric{};
   const Path inward = {{0, {0, 0, 0}}, {0.5, {0.1, 0, 0}}},
              outward = {{0, {0, 0, 0}}, {0.5, {-0.1, 0, 0}}};
@@ -244,7 +244,7 @@ TEST(Relaxation, TrianglesAndClothOnABodyComeToRestToo) {
   for (const Vector2d& flat : mesh.flat) mesh.start.emplace_back(flat.x(), 0.101, flat.y());
   SheetDefinition sheet;
   sheet.shape = complete(mesh);
-  sheet.textile = square(3).textile;
+  sheet.textile = square_sheet(3).textile;
   sheet.bending = Isometric{};
   Scene scene;
   scene.sheets = {sheet};

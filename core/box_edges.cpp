@@ -4,8 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <set>
-#include <utility>
 
 #include "core/contact/nearest.h"
 
@@ -141,11 +139,20 @@ Meeting meet_corner(const PlacedBox& box, int corner, const Vector3d& a, const V
 
 BoxEdges::BoxEdges(const SheetDefinition& sheet)
     : margin_(2 * sheet.spacing()), number_(static_cast<std::size_t>(sheet.particle_count()), -1) {
-  std::set<std::pair<int, int>> known;
+  std::vector<std::array<int, 3>> edges;  // two ends, and which of all triangles' edges it is
   for (const auto& particles : triangles_of(sheet.shape)) {
-    Triangle& made = triangles_.emplace_back(Triangle{particles, {}});
-    for (std::size_t k = 0; k < 3; ++k)
-      made.edges[k] = known.insert(std::minmax(particles[k], particles[(k + 1) % 3])).second;
+    triangles_.push_back({particles, {}});
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [from, to] = std::minmax(particles[k], particles[(k + 1) % 3]);
+      edges.push_back({from, to, static_cast<int>(edges.size())});
+    }
+  }
+  std::sort(edges.begin(), edges.end());
+  for (std::size_t n = 0; n < edges.size(); ++n) {
+    const auto& [from, to, which] = edges[n];
+    if (n > 0 && edges[n - 1][0] == from && edges[n - 1][1] == to) continue;
+    triangles_[static_cast<std::size_t>(which / 3)].edges[static_cast<std::size_t>(which % 3)] =
+        true;
   }
 }
 
@@ -209,14 +216,16 @@ void BoxEdges::keep_off(const Contacts& contacts, double dt, MovingSheet& sheet)
   x_.resize(3, static_cast<Eigen::Index>(movers_.size()));
   d_.resize(3, x_.cols());
   for (const Mover& mover : movers_) {
+    number_[static_cast<std::size_t>(mover.particle)] = -1;
+    if (mover.touching == 0) continue;  // it is held
     const auto k = static_cast<Eigen::Index>(particles_.size());
     x_.col(k) = mover.by;
     d_.col(k) = mover.in_step;
     particles_.push_back(mover.particle);
-    number_[static_cast<std::size_t>(mover.particle)] = -1;
   }
-  sheet.solver->displace(particles_, x_, d_);
-  come_ += x_.colwise().norm().maxCoeff();
+  const auto count = static_cast<Eigen::Index>(particles_.size());
+  sheet.solver->displace(particles_, x_.leftCols(count), d_.leftCols(count));
+  come_ += x_.leftCols(count).colwise().norm().maxCoeff();
 }
 
 // Each edge, or triangle, with the place that it is led out by.

@@ -64,11 +64,12 @@ class GapsToBox {
   }
   // m^2
   double to_edge(int edge) const {
-    const auto axis = static_cast<std::size_t>(edge / 4);
-    return span_[axis] + end_[(axis + 1) % 3][edge & 1] + end_[(axis + 2) % 3][(edge & 2) / 2];
+    const auto e = static_cast<std::size_t>(edge), axis = e / 4;
+    return span_[axis] + end_[(axis + 1) % 3][e & 1] + end_[(axis + 2) % 3][(e & 2) / 2];
   }
   double to_corner(int corner) const {
-    return end_[0][corner & 1] + end_[1][(corner & 2) / 2] + end_[2][corner / 4];
+    const auto c = static_cast<std::size_t>(corner);
+    return end_[0][c & 1] + end_[1][(c & 2) / 2] + end_[2][c / 4];
   }
   double to_nearest_edge() const {
     double sum = 0, most = 0;

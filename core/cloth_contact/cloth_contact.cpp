@@ -47,6 +47,8 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
     pushed = std::max(pushed, 2 * kMotionRounding * sheet.solver->pushed());
   }
   come_ += pushed;
+  // as where a pin jerks: positions before this step are still known
+  if (come_ + in_step > window_.most_come) window_.steps = 0;
   if (window_.steps == 0) begin_window(sheets, in_step);
   come_ += in_step;
   ++window_.steps;
@@ -84,15 +86,15 @@ void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step) {
   moved_ += come_;
   come_ = 0;
   window_.reach = reach(in_step);
-  const double most_come = in_step + kSpare * window_.reach;
-  const bool holds = moved_ + most_come <= lists_.lasts();
+  window_.most_come = in_step + kSpare * window_.reach;
+  const bool holds = moved_ + window_.most_come <= lists_.lasts();
   window_.is_known = scene_.solver.plain || !lists_.empty() || !holds;
   if (!window_.is_known) return;
   read(sheets);
   begin_ = x_ - d_;
   if (scene_.solver.plain || !lists_.empty()) return;
   // nothing was near: that may last
-  lists_.expect(begin_, most_come);
+  lists_.expect(begin_, window_.most_come);
   moved_ = 0;
   window_.is_known = !lists_.empty();
 }

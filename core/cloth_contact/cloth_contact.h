@@ -17,8 +17,10 @@ namespace weft {
 // Contact acts once in a window of several steps, in which nothing moves far in relation to what it
 // is near; a window ends with its frame at the latest, so frames can be gone on from. Where it ends
 // it is known how far everything came, and so what may have met, but where nothing was near enough
-// to begin with: what comes of it does not depend on lists, nor on who computes them. Where nothing
-// was near, it is seen from rough positions at the end of a window that the next may pass unseen.
+// to begin with. A step in which something comes farther than was foreseen for its window begins a
+// window of its own. What comes of it does not depend on lists, nor on who computes them. Where
+// nothing was near, it is seen from rough positions at the end of a window that the next may pass
+// unseen.
 class ClothContact {
  public:
   // Holds on to the scene.
@@ -44,6 +46,7 @@ class ClothContact {
   struct Window {
     int steps = 0, most_steps = 1;
     double reach = 0;       // of motion in it, in relation to anything else, m
+    double most_come = 0;   // what is foreseen; where more comes it begins anew, m
     bool is_known = false;  // where it began
   };
 

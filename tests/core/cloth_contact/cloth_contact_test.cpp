@@ -163,7 +163,15 @@ TEST(ClothContact, AStackOfSheetsIsCarriedByTheLowest) {
   EXPECT_EQ(cuts_now(simulation), 0);
 }
 
-// Bit for bit, with the solvers that vectors have and with plain ones.
+// Also where pairs are those of a plain search.
+std::unique_ptr<SheetSolver> solver_in_vectors(const Scene& scene, const SheetDefinition& sheet,
+                                               const Mesh& mesh, const Dynamics& dynamics) {
+  Scene other = scene;
+  other.solver.plain = false;
+  return make_solver(other, sheet, mesh, dynamics);
+}
+
+// Bit for bit.
 TEST(ClothContact, MissesNoPairThatAPlainSearchOfAllFinds) {
   for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
     for (const auto& [seed, haste] : {std::pair(1U, 1.0), {10U, 1.0}, {20U, 6.0}}) {
@@ -172,19 +180,43 @@ TEST(ClothContact, MissesNoPairThatAPlainSearchOfAllFinds) {
       listed.solver.frame_step = 0.005;
       Scene plain = listed;
       plain.solver.plain = true;
-      const SolverFactory fast = [](const Scene& scene, const SheetDefinition& sheet,
-                                    const Mesh& mesh, const Dynamics& dynamics) {
-        Scene other = scene;
-        other.solver.plain = false;
-        return make_solver(other, sheet, mesh, dynamics);
-      };
-      Simulation one(listed, fast), other(plain, fast);
+      Simulation one(listed, solver_in_vectors), other(plain, solver_in_vectors);
       const std::vector<Matrix3Xd> start = by_sheet(one, positions(one));
       for (int frame = 0; frame < 8; ++frame) {
         ASSERT_TRUE(one.advance_frame());
         ASSERT_TRUE(other.advance_frame());
         ASSERT_EQ(positions(one), positions(other)) << frame;
       }
+    }
+  }
+}
+
+// Bit for bit: pins rest while nothing is near, and then jerk one sheet through the other.
+TEST(ClothContact, MissesNoPairWhereAPinBeginsToMoveWithinAWindow) {
+  constexpr double kSpeed = 20;  // m/s
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    SheetDefinition above = lattice(9, 9), below = triangles(0.08, 0.08);
+    above.origin.y() = 2.2e-3 + 2e-4 * seed;
+    const Vector3d aside = 0.2 * noise(1, seed);
+    const Vector3d way = 0.04 * (aside - Vector3d::UnitY()).normalized();
+    const double begin = 7e-4 + 1.3e-4 * seed;
+    above.pins.push_back(
+        {{40 + static_cast<int>(seed)},
+         {{0, Vector3d::Zero()}, {begin, Vector3d::Zero()}, {begin + way.norm() / kSpeed, way}}});
+    Scene listed = touching({above, below});
+    listed.environment.gravity.setZero();
+    listed.solver.frame_step = 0.001;
+    listed.solver.substep = 4e-5;  // six of them in a window
+    Scene plain = listed;
+    plain.solver.plain = true;
+    Simulation one(listed, solver_in_vectors), other(plain, solver_in_vectors),
+        restored(listed, solver_in_vectors);
+    for (int frame = 0; frame < 5; ++frame) {
+      ASSERT_TRUE(restored.restore(one.snapshot()));
+      for (Simulation* each : {&one, &other, &restored}) ASSERT_TRUE(each->advance_frame());
+      ASSERT_EQ(positions(one), positions(other)) << frame;
+      ASSERT_EQ(positions(one), positions(restored)) << frame;
     }
   }
 }
@@ -208,13 +240,7 @@ TEST(ClothContact, MissesNoPairOfASheetThatSwingsTogetherFromAfar) {
     listed.solver.frame_step = 0.005;
     Scene plain = listed;
     plain.solver.plain = true;
-    const SolverFactory fast = [](const Scene& scene, const SheetDefinition& definition,
-                                  const Mesh& mesh, const Dynamics& dynamics) {
-      Scene other = scene;
-      other.solver.plain = false;
-      return make_solver(other, definition, mesh, dynamics);
-    };
-    Simulation one(listed, fast), other(plain, fast);
+    Simulation one(listed, solver_in_vectors), other(plain, solver_in_vectors);
     listed.cloth_contact = false;
     Simulation passing(listed);
     int same = 0;  // frames before anything met

@@ -366,6 +366,27 @@ void warn_of_body(std::size_t index, const Body& body, Plan& plan) {
               "cell_m")});
 }
 
+// Particles are kept out, and what fits between them is not met.
+void warn_of_thin_colliders(const Scene& scene, Plan& plan) {
+  const double across_cell = std::sqrt(2.0);
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c) {
+    const auto* sphere = std::get_if<Sphere>(&scene.colliders[c].shape);
+    const auto* capsule = std::get_if<Capsule>(&scene.colliders[c].shape);
+    if (sphere == nullptr && capsule == nullptr) continue;
+    const double radius = sphere != nullptr ? sphere->radius : capsule->radius;
+    for (const SheetDefinition& sheet : scene.sheets) {
+      const double width = 2 * (radius + sheet.skin_or_default());
+      const double gap = sheet.spacing() * (sphere != nullptr ? across_cell : 1);
+      if (width >= gap) continue;
+      plan.warnings.push_back(
+          {"COLLIDER_THIN", join("colliders[", c, sphere != nullptr ? "].sphere" : "].capsule"),
+           join("is ", width, " m wide with the skin of sheet \"", sheet.name,
+                "\", whose particles are ", sheet.spacing(),
+                " m apart: it may pass between them. A finer mesh or a larger skin_m helps")});
+    }
+  }
+}
+
 // "; 30 in panel front, 15 in panel sleeve", of those on a seam in the first.
 std::string count_by_panel(const SheetShape& shape, std::vector<bool> particles) {
   const auto* mesh = std::get_if<Triangles>(&shape);
@@ -418,6 +439,7 @@ void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
   for (std::size_t c = 0; c < scene.colliders.size(); ++c)
     if (const auto* body = std::get_if<SharedBody>(&scene.colliders[c].shape))
       warn_of_body(c, **body, plan);
+  warn_of_thin_colliders(scene, plan);
   warn_of_start_inside(scene, planned, plan);
   for (std::size_t s = 0; s < planned.size(); ++s) {
     if (std::holds_alternative<Triangles>(scene.sheets[s].shape)) {
@@ -443,6 +465,7 @@ std::span<const std::string_view> warning_codes() {
                                                 "BODY_MENDED",
                                                 "BODY_THIN",
                                                 "CLAMP_RULES",
+                                                "COLLIDER_THIN",
                                                 "COMPRESSION_SOFTENS",
                                                 "MESH_DEPENDENT",
                                                 "MESH_TOO_COARSE",

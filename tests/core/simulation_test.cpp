@@ -156,6 +156,31 @@ TEST(Simulation, APlanWarnsOfWhatTheModelLeavesOut) {
   EXPECT_TRUE(warns(scene, "NO_SHEET_SHEET_COLLISION"));
 }
 
+// Of the lowest particle that falls on a rail.
+double lowest_over(Scene scene, double radius) {
+  scene.colliders = {{"rail", Capsule{{-1, -0.05, 0.05}, {2, -0.05, 0.05}, radius}, 0.3, {}}};
+  const bool warned = warns(scene, "COLLIDER_THIN");
+  Simulation simulation(std::move(scene));
+  double lowest = 0;
+  for (int frame = 0; frame < 20 && simulation.advance_frame(); ++frame)
+    lowest = positions(simulation).row(1).minCoeff();
+  EXPECT_EQ(warned, lowest < -0.1);
+  return lowest;
+}
+
+TEST(Simulation, WarnsOfCollidersThatFitBetweenParticles) {
+  SheetDefinition sheet = flat_sheet(2, 3, 0.1);  // two rows, 5 cm on either side of the rail
+  sheet.skin = 0.005;
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  EXPECT_LT(lowest_over(scene, 0.04), -0.2);
+  EXPECT_GT(lowest_over(scene, 0.05), -0.1);
+  scene.colliders = {{"ball", Sphere{{0, -1, 0}, 0.064}, 0.3, {}}};
+  EXPECT_TRUE(warns(scene, "COLLIDER_THIN"));
+  scene.colliders = {{"ball", Sphere{{0, -1, 0}, 0.067}, 0.3, {}}};
+  EXPECT_FALSE(warns(scene, "COLLIDER_THIN"));
+}
+
 TEST(Simulation, AStiffSheetWithoutADampingGetsTheSafeRatioAndAWarning) {
   Scene scene = hanging();
   scene.sheets[0].textile.damping = {};

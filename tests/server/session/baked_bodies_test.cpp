@@ -93,9 +93,8 @@ TEST_F(BakedBodiesTest, ThatFailAreTriedAgain) {
   EXPECT_EQ(bodies.get("key", fail).problems.size(), 1u);
   const auto run_out = []() -> MadeBody { throw std::runtime_error("memory"); };
   EXPECT_THROW(bodies.get("key", run_out), std::runtime_error);
-  EXPECT_TRUE(bodies.get("key", [] {
-    return make_body(ball_mesh(0.1, 1), {.reach = 1e-3}, "mesh");
-  }).body);
+  EXPECT_TRUE(
+      bodies.get("key", [] { return make_body(ball_mesh(0.1, 1), {.reach = 1e-3}, "mesh"); }).body);
 }
 
 }  // namespace

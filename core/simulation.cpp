@@ -236,7 +236,7 @@ bool Simulation::State::quiet(const NextStates& next) const {
   const Drive drive{scene.environment.gravity, 0, scene.solver.frame_step};
   for (std::size_t s = 0; s < sheets.size(); ++s)
     if (!is_quiet(sheets[s].mesh, sheets[s].dynamics.inverse_mass, drive,
-                  height_of(scene.sheets[s]), sheets[s].good(), next[s]))
+                  height_of(scene.sheets[s]), sheets[s].good(), next[s], scene.cloth_contact))
       return false;
   return true;
 }

@@ -58,6 +58,8 @@ Scene dressed_scene() {
     scene.sheets.push_back(rough_sheet(shape, Isometric{}));
   std::vector<double>& start = scene.sheets[1].start_positions;
   for (std::size_t i = 1; i < start.size(); i += 3) start[i] += 1e-3;
+  std::vector<double>& open = scene.sheets[0].start_positions;
+  open[open.size() - 3] += 0.02;
   scene.cloth_contact = true;
   for (SheetDefinition& sheet : scene.sheets) sheet.textile.damping_ratio = 0.02;
   scene.solver.step_bound = StepBound::kUnsheared;

@@ -4,6 +4,8 @@
 #include <cassert>
 #include <limits>
 
+#include "core/cloth_contact/cuts.h"
+#include "core/cloth_contact/near_blocks.h"
 #include "core/cloth_contact/tangles.h"
 #include "core/contact/contact.h"
 #include "core/forces/air.h"
@@ -20,6 +22,16 @@ NextStates& next_states(std::size_t sheets) {
   static thread_local NextStates states;
   states.resize(sheets);
   return states;
+}
+
+// Edges that pass through triangles where the scene starts.
+std::int64_t cuts_at_start(const Scene& scene, const LeftOut& left_out) {
+  const Cloth cloth(scene.sheets, left_out);
+  Matrix3Xd x;
+  cloth.join([&](std::size_t s) { return start_positions(scene.sheets[s]); }, x);
+  NearBlocks blocks(cloth);
+  blocks.set(x);
+  return count_cuts(cloth, blocks, x, 0).count;
 }
 
 }  // namespace
@@ -228,7 +240,7 @@ bool Simulation::State::quiet(const NextStates& next) const {
   const Drive drive{scene.environment.gravity, 0, scene.solver.frame_step};
   for (std::size_t s = 0; s < sheets.size(); ++s)
     if (!is_quiet(sheets[s].mesh, sheets[s].dynamics.inverse_mass, drive,
-                  height_of(scene.sheets[s]), sheets[s].good(), next[s]))
+                  height_of(scene.sheets[s]), sheets[s].good(), next[s], scene.cloth_contact))
       return false;
   return true;
 }
@@ -282,8 +294,8 @@ void Simulation::State::make_cloth_contact() {
   if (scene.cloth_contact) cloth_contact.emplace(scene, open);
 }
 
-// Triangles that reach from one panel to another pass through what lies between: cloth contact
-// leaves them out.
+// Triangles that reach from one panel to another may pass through what lies between: where one
+// starts so, cloth contact leaves all of them out.
 LeftOut Simulation::State::find_open_seams() {
   LeftOut open;
   open_seams.clear();
@@ -292,6 +304,7 @@ LeftOut Simulation::State::find_open_seams() {
     open.push_back(triangles_at_open_seams(scene.sheets[s]));
     if (!scene.colliders.empty()) open_seams.emplace_back(scene.sheets[s], open.back());
   }
+  if (scene.cloth_contact && cuts_at_start(scene, {}) == cuts_at_start(scene, open)) open.clear();
   return open;
 }
 

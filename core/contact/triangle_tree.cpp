@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 
 #include "core/contact/nearest.h"
@@ -28,10 +29,18 @@ TriangleTree::TriangleTree(const BodyMesh& mesh) : mesh_(mesh), order_(mesh.tria
   std::vector<Vector3d> middles;
   for (const int t : order_) middles.emplace_back((corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3);
   build(0, static_cast<int>(order_.size()), middles);
+  for (const int t : order_) discs_.push_back(disc_of(t, middles[static_cast<std::size_t>(t)]));
+}
+
+TriangleTree::Disc TriangleTree::disc_of(int triangle, const Vector3d& middle) const {
+  const Vector3d &a = corner(triangle, 0), &b = corner(triangle, 1), &c = corner(triangle, 2);
+  const double squared = std::max(
+      {(a - middle).squaredNorm(), (b - middle).squaredNorm(), (c - middle).squaredNorm()});
+  return {middle, (b - a).cross(c - a).stableNormalized(), std::sqrt(squared)};
 }
 
 void TriangleTree::build(int first, int last, const std::vector<Vector3d>& middles) {
-  constexpr int kLeaf = 2;
+  constexpr int kLeaf = 8;
   const std::size_t node = nodes_.size();
   nodes_.emplace_back();
   const auto begin = order_.begin() + first, end = order_.begin() + last;
@@ -57,6 +66,16 @@ void TriangleTree::build(int first, int last, const std::vector<Vector3d>& middl
   build(middle, last, middles);
 }
 
+// No more than that of anything in the disc, whatever was rounded.
+double TriangleTree::least_squared(const Disc& disc, const Vector3d& point) {
+  constexpr double kRounding = 1 - 1e-9;
+  const Vector3d off = point - disc.middle;
+  const double height = off.dot(disc.normal), above = height * height;
+  const double across = std::sqrt(std::max(off.squaredNorm() - above, 0.0));
+  const double beside = std::max(across - disc.radius, 0.0);
+  return (above + beside * beside) * kRounding;
+}
+
 double TriangleTree::squared_distance(int triangle, const Vector3d& point) const {
   const Vector3d &a = corner(triangle, 0), &b = corner(triangle, 1), &c = corner(triangle, 2);
   const auto [u, v, w] = nearest_in_triangle(point, a, b, c);
@@ -73,6 +92,7 @@ TriangleTree::Nearest TriangleTree::nearest(const Vector3d& point, int guess) co
     if (least >= best.squared) continue;
     const Node& node = nodes_[static_cast<std::size_t>(index)];
     for (int i = node.first; i < node.first + node.count; ++i) {
+      if (least_squared(discs_[static_cast<std::size_t>(i)], point) >= best.squared) continue;
       const int t = order_[static_cast<std::size_t>(i)];
       if (const double squared = squared_distance(t, point); squared < best.squared)
         best = {squared, t};

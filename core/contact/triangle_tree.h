@@ -26,20 +26,28 @@ class TriangleTree {
   double first_hit(int from, const Vector3d& start, const Vector3d& direction) const;
 
  private:
+  // Around a triangle, in its plane.
+  struct Disc {
+    Vector3d middle, normal;  // m; of length 1
+    double radius;            // m
+  };
   struct Node {
     Eigen::AlignedBox3d box;
     int first = 0;  // of its triangles in order_; of an inner node, its second child
     int count = 0;  // of triangles; 0: an inner node, whose first child comes next
   };
+  Disc disc_of(int triangle, const Vector3d& middle) const;
   void build(int first, int last, const std::vector<Vector3d>& middles);
   const Vector3d& corner(int triangle, std::size_t k) const {
     const int vertex = mesh_.triangles[static_cast<std::size_t>(triangle)][k];
     return mesh_.vertices[static_cast<std::size_t>(vertex)];
   }
+  static double least_squared(const Disc& disc, const Vector3d& point);
   double squared_distance(int triangle, const Vector3d& point) const;
 
   const BodyMesh& mesh_;
   std::vector<int> order_;
+  std::vector<Disc> discs_;  // in that order
   std::vector<Node> nodes_;
 };
 

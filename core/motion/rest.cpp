@@ -3,7 +3,7 @@
 namespace weft {
 
 bool is_quiet(const Mesh& mesh, const VectorXd& inverse_mass, const Drive& drive, double height,
-              const SheetState& before, const SheetState& after) {
+              const SheetState& before, const SheetState& after, bool by_frame) {
   constexpr double kEnergyShare = 1e-6, kForceShare = 0.01;
   const double given = drive.gravity.norm();
   const double gravity = given > 0 ? given : kStandardGravity;
@@ -12,7 +12,9 @@ bool is_quiet(const Mesh& mesh, const VectorXd& inverse_mass, const Drive& drive
   int free = 0;
   for (Eigen::Index i = 0; i < after.v.cols(); ++i) {
     if (inverse_mass[i] == 0) continue;
-    energy += mesh.mass[i] / 2 * after.v.col(i).squaredNorm();
+    Vector3d v = after.v.col(i);
+    if (by_frame) v = (after.x.col(i) - before.x.col(i)) / drive.frame_step;
+    energy += mesh.mass[i] / 2 * v.squaredNorm();
     squares += (after.v.col(i) - before.v.col(i)).squaredNorm();
     ++free;
   }

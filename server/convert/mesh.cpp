@@ -7,9 +7,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -19,6 +17,8 @@
 #include "core/contact/moving_bodies.h"
 #include "core/model/mesh_problems.h"
 #include "core/model/text.h"
+#include "server/session/baked_bodies.h"
+#include "server/session/memory.h"
 
 namespace weft {
 namespace {
@@ -82,28 +82,18 @@ void check_size(const std::string& bytes, std::size_t unit, const std::string& f
         {field, join("has ", bytes.size(), " bytes, which is no multiple of ", unit)});
 }
 
-// Sessions with the same body share it, as long as one of them is there.
+// A sixteenth of the memory is for bodies that may be asked for again.
 MadeBody shared_body(const v1::MeshData& from, const BodySettings& settings,
                      const std::string& field) {
+  static BakedBodies bodies(static_cast<std::size_t>(memory_there_is() / 16));
   const std::string_view positions = positions_of(from);
-  static std::mutex mutex;
-  static std::map<std::string, std::weak_ptr<const Body>> bodies;
   const std::string key = std::string(positions) + from.triangles() +
                           bytes_of(std::vector{static_cast<double>(positions.size()), settings.cell,
                                                settings.reach, settings.moves ? 1.0 : 0.0});
-  {
-    const std::lock_guard lock(mutex);
-    const auto known = bodies.find(key);
-    if (known != bodies.end())
-      if (auto body = known->second.lock()) return {std::move(body), {}};
-  }
-  MadeBody made =
-      make_body({points_of<Vector3d>(positions), triangles_of(from.triangles())}, settings, field);
-  if (!made.body) return made;
-  const std::lock_guard lock(mutex);
-  std::erase_if(bodies, [](const auto& each) { return each.second.expired(); });
-  bodies[key] = made.body;
-  return made;
+  return bodies.get(key, [&] {
+    return make_body({points_of<Vector3d>(positions), triangles_of(from.triangles())}, settings,
+                     field);
+  });
 }
 
 // What of a mesh keeps it from being a body's, before its triangles are looked at.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/cloth_contact/cuts.h"
 #include "core/forces/elastic.h"
 #include "core/simulation.h"
 #include "core/triangles/ease.h"
@@ -90,6 +91,31 @@ Scene around_pole_beside_a_bar() {
   const Vector3d end = Vector3d::UnitY();
   scene.colliders.push_back({"bar", Capsule{kBarAt - end, kBarAt + end, kBar}, 0, {}});
   return scene;
+}
+
+// The same around a band, too, that is held upright.
+Scene around_pole_and_band() {
+  constexpr int kRows = 21, kColumns = 3;
+  Scene scene = around_pole(0.05);
+  SheetDefinition band = scene.sheets[0];
+  band.name = "band";
+  band.shape = Grid{kRows, kColumns, 0.01};
+  band.pins.resize(1);
+  for (int i = 0; i < kRows * kColumns; ++i) {
+    band.start_positions.insert(band.start_positions.end(),
+                                {0.08, 0.01 * (i / kColumns) - 0.05, 0.01 * (i % kColumns) + 0.03});
+    band.pins[0].particles.push_back(i);
+  }
+  scene.sheets.push_back(band);
+  scene.cloth_contact = true;
+  return scene;
+}
+
+std::int64_t cuts_of(const Simulation& simulation) {
+  const std::vector<SheetDefinition>& sheets = simulation.scene().sheets;
+  const Matrix3Xd x = positions(simulation);
+  const int first = sheets[0].particle_count();
+  return count_cuts(sheets, {x.leftCols(first), x.rightCols(x.cols() - first)}).count;
 }
 
 void dress(Simulation& simulation, int frames) {
@@ -233,6 +259,14 @@ TEST(Dressing, WhatReachesFromPanelToPanelIsNotDrawnThroughABody) {
     }
   }
   EXPECT_NEAR(girth(simulation, 5), 2 * kPanelWidth, 0.01 * kPanelWidth);
+}
+
+TEST(Dressing, WhatReachesFromPanelToPanelIsNotDrawnThroughCloth) {
+  Simulation simulation(around_pole_and_band());
+  for (int frame = 0; frame < 90; ++frame) {
+    ASSERT_EQ(cuts_of(simulation), 0) << "frame " << frame;
+    dress(simulation, 1);
+  }
 }
 
 TEST(Dressing, NothingRubsWhileSeamsClose) {

@@ -280,31 +280,30 @@ Simulation::State::State(Scene given, SolverFactory factory)
     sheets[s].solver->start(x[s], v, 0, dt);
     sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
   }
-  const LeftOut open = find_open_seams();
-  if (scene.cloth_contact) {
-    cloth_contact.emplace(scene, open);
-    if (auto tangled = find_tangles(scene, x, open)) plan.warnings.push_back(std::move(*tangled));
-  }
+  make_cloth_contact();
+  if (scene.cloth_contact)
+    if (auto tangled = find_tangles(scene, x, at_open_seams()))
+      plan.warnings.push_back(std::move(*tangled));
   find_box_edges();
   forget_motion();
 }
 
-void Simulation::State::make_cloth_contact() {
-  const LeftOut open = find_open_seams();
-  if (scene.cloth_contact) cloth_contact.emplace(scene, open);
-}
-
 // Triangles that reach from one panel to another may pass through what lies between: where one
 // starts so, cloth contact leaves all of them out.
-LeftOut Simulation::State::find_open_seams() {
-  LeftOut open;
+void Simulation::State::make_cloth_contact() {
+  LeftOut open = at_open_seams();
   open_seams.clear();
+  if (!scene.colliders.empty())
+    for (std::size_t s = 0; s < open.size(); ++s) open_seams.emplace_back(scene.sheets[s], open[s]);
+  if (!scene.cloth_contact) return;
+  if (!open.empty() && cuts_at_start(scene, {}) == cuts_at_start(scene, open)) open.clear();
+  cloth_contact.emplace(scene, open);
+}
+
+LeftOut Simulation::State::at_open_seams() const {
+  LeftOut open;
   if (sheets.front().dressing.ease == 1) return open;
-  for (std::size_t s = 0; s < sheets.size(); ++s) {
-    open.push_back(triangles_at_open_seams(scene.sheets[s]));
-    if (!scene.colliders.empty()) open_seams.emplace_back(scene.sheets[s], open.back());
-  }
-  if (scene.cloth_contact && cuts_at_start(scene, {}) == cuts_at_start(scene, open)) open.clear();
+  for (const SheetDefinition& sheet : scene.sheets) open.push_back(triangles_at_open_seams(sheet));
   return open;
 }
 

@@ -62,7 +62,7 @@ struct Simulation::State {
   State(Scene given, SolverFactory factory);
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
   int particle_count() const;
-  LeftOut find_open_seams();
+  LeftOut at_open_seams() const;
   void find_box_edges();
   void make_cloth_contact();
   Contacts contacts_of(std::size_t sheet, double time, double dt) const;

@@ -173,7 +173,7 @@ TEST(Simulation, WarnsOfCollidersThatFitBetweenParticles) {
   sheet.skin = 0.005;
   Scene scene = floating(sheet);
   scene.environment.gravity = {0, -9.8, 0};
-  EXPECT_LT(lowest_over(scene, 0.04), -0.2);
+  EXPECT_LT(lowest_over(scene, 0.04), -0.15);
   EXPECT_GT(lowest_over(scene, 0.05), -0.1);
   scene.colliders = {{"ball", Sphere{{0, -1, 0}, 0.064}, 0.3, {}}};
   EXPECT_TRUE(warns(scene, "COLLIDER_THIN"));

@@ -88,12 +88,14 @@ std::size_t triangle_count(const v1::SheetLayout& sheet) {
          static_cast<std::size_t>(sheet.columns() - 1);
 }
 
+std::string simulated_text(int every) {
+  return every > 1 ? fmt::format(" (each {}. row and column simulated)", every) : "";
+}
+
 std::string shape_text(const v1::SheetLayout& sheet) {
-  if (is_grid(sheet)) {
-    const std::string text = fmt::format("{} x {} particles", sheet.rows(), sheet.columns());
-    if (sheet.simulated_every() <= 1) return text;
-    return text + fmt::format(", each {}. row and column simulated", sheet.simulated_every());
-  }
+  if (is_grid(sheet))
+    return fmt::format("{} x {} particles{}", sheet.rows(), sheet.columns(),
+                       simulated_text(sheet.simulated_every()));
   return fmt::format("{}, {}", count_of(sheet.particle_count(), "particle"),
                      count_of(sheet.triangle_count(), "triangle"));
 }

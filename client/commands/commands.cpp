@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "client/output/text.h"
+#include "client/sheet_layout.h"
 #include "server/config.h"
 
 namespace weft::client {
@@ -24,10 +25,8 @@ std::optional<double> seconds_of(const v1::Plan& plan, const v1::ServerStats& st
 std::string shape_text(const v1::Sheet& sheet) {
   if (sheet.has_grid()) {
     const v1::Grid& grid = sheet.grid();
-    const std::string text = fmt::format("{} x {} particles, {:.4g} mm apart", grid.rows(),
-                                         grid.columns(), grid.spacing_m() * 1e3);
-    if (grid.simulated_every() <= 1) return text;
-    return text + fmt::format(", each {}. row and column simulated", grid.simulated_every());
+    return fmt::format("{} x {} particles{}, {:.4g} mm apart", grid.rows(), grid.columns(),
+                       simulated_text(grid.simulated_every()), grid.spacing_m() * 1e3);
   }
   const std::string& asset = sheet.triangles().asset();
   return asset.empty() ? "triangles" : "triangles of " + asset;

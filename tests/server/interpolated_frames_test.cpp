@@ -84,7 +84,8 @@ TEST(InterpolatedFrames, HaveTheNumbersOfTheCoarserSheetWhereParticlesAreSimulat
   EXPECT_EQ(layout.simulated_every(), kEvery);
   const auto topology = shown.read();
   ASSERT_TRUE(topology && topology->has_topology());
-  EXPECT_EQ(topology->topology().mesh().triangles().size(), 4u * 3 * layout.triangle_count());
+  const auto triangles = static_cast<std::size_t>(layout.triangle_count());
+  EXPECT_EQ(topology->topology().mesh().triangles().size(), 4 * 3 * triangles);
 
   const v1::Frame one = shown.frame(), other = solved.frame();
   EXPECT_EQ(simulated(numbers(one.positions_m())), numbers(other.positions_m()));
@@ -92,7 +93,7 @@ TEST(InterpolatedFrames, HaveTheNumbersOfTheCoarserSheetWhereParticlesAreSimulat
   EXPECT_EQ(simulated(numbers(one.pressure_pa())), numbers(other.pressure_pa()));
   EXPECT_EQ(simulated(numbers(one.clearance_m())), numbers(other.clearance_m()));
   EXPECT_EQ(one.stats().SerializeAsString(), other.stats().SerializeAsString());
-  EXPECT_EQ(numbers(one.strain()).size(), 3u * static_cast<std::size_t>(layout.triangle_count()));
+  EXPECT_EQ(numbers(one.strain()).size(), 3 * triangles);
   for (const double pressure : numbers(one.pressure_pa())) EXPECT_GE(pressure, 0);
 }
 

@@ -41,7 +41,7 @@ class BoxEdges {
     int particle;
     Vector3d d;                                                  // in the step, before
     Vector3d by = Vector3d::Zero(), in_step = Vector3d::Zero();  // what is added
-    Vector3d ask_by = by, ask_in_step = in_step;                 // in a round, by all
+    Vector3d more_by = by, more_in_step = in_step;               // in a round
     int touching = 0;                                            // so many
   };
   // What is within the skin at a place, which lies between particles.
@@ -50,6 +50,7 @@ class BoxEdges {
     Vector3d weights, share = Vector3d::Zero();  // of the place; in what it moves by
     Vector3d out, carried;
     double friction;
+    double part = 1;                 // of what it needs, that it gets in a round
     double depth = 0;                // that it is pushed out by, m
     double stopped = 0, rubbed = 0;  // in all rounds, m
   };

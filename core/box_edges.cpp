@@ -287,7 +287,9 @@ void BoxEdges::find_touching(const Contacts& contacts, double dt, const MovingSh
     const Meeting meeting = near.count() == 2 ? meet_edge(box, near.place, at(0), at(1))
                                               : meet_corner(box, near.place, at(0), at(1), at(2));
     near.clear = meeting.depth > 0 ? 0 : come_ + meeting.distance - box.skin;
-    if (meeting.depth > 0 && meeting.distance < nearest.distance) nearest = meeting;
+    bool inside = false;  // the collider leads particles out first
+    for (Eigen::Index k = 0; k < near.count(); ++k) inside = inside || box.has(at(k));
+    if (!inside && meeting.depth > 0 && meeting.distance < nearest.distance) nearest = meeting;
     const bool is_last = n + 1 == due_.size() || due_[n + 1]->collider != near.collider ||
                          due_[n + 1]->particles != near.particles;
     if (!is_last) continue;

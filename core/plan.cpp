@@ -437,6 +437,14 @@ void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
     plan.warnings.push_back(
         {"NO_SHEET_SHEET_COLLISION", "sheets", "sheets may pass through each other"});
   for (std::size_t c = 0; c < scene.colliders.size(); ++c)
+    if (std::holds_alternative<Box>(scene.colliders[c].shape))
+      plan.warnings.push_back(
+          {"BOX_EDGES", "colliders[" + std::to_string(c) + "].box",
+           "only particles are kept out: an edge of the box may cut through the "
+           "cells between them, and cells that are pulled over an edge may stay hooked on it, "
+           "stretched by half for good. A finer grid, a larger skin_m or a capsule along the "
+           "edge helps"});
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
     if (const auto* body = std::get_if<SharedBody>(&scene.colliders[c].shape))
       warn_of_body(c, **body, plan);
   warn_of_thin_colliders(scene, plan);
@@ -464,6 +472,7 @@ std::span<const std::string_view> warning_codes() {
   static constexpr std::string_view kCodes[] = {"BENDING_TOO_UNEQUAL",
                                                 "BODY_MENDED",
                                                 "BODY_THIN",
+                                                "BOX_EDGES",
                                                 "CLAMP_RULES",
                                                 "COLLIDER_THIN",
                                                 "COMPRESSION_SOFTENS",

@@ -72,8 +72,6 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   const bool settles = is_relaxing() && relaxation->settling > 0;
   if (cloth_contact && unfinished->substeps == 0)
     cloth_contact->untangle(sheets, begin < end_of_untangling(scene));
-  if (unfinished->substeps == 0)
-    for (BoxEdges& edges : box_edges) edges.forget();
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
     step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
     ++k;
@@ -98,8 +96,6 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
   if (!scene.colliders.empty()) bodies.place(time + dt, dt);
   for (std::size_t s = 0; s < open_seams.size(); ++s)
     open_seams[s].keep_out(contacts_of(s, time, dt), dt, sheets[s]);
-  for (std::size_t s = 0; s < box_edges.size(); ++s)
-    box_edges[s].keep_off(contacts_of(s, time, dt), dt, sheets[s]);
   if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame);
 
   // colliders last, so that no particle ends a step inside one
@@ -284,7 +280,6 @@ Simulation::State::State(Scene given, SolverFactory factory)
   if (scene.cloth_contact)
     if (auto tangled = find_tangles(scene, x, at_open_seams()))
       plan.warnings.push_back(std::move(*tangled));
-  find_box_edges();
   forget_motion();
 }
 
@@ -307,14 +302,6 @@ LeftOut Simulation::State::at_open_seams() const {
   return open;
 }
 
-void Simulation::State::find_box_edges() {
-  box_edges.clear();
-  if (std::ranges::any_of(scene.colliders, [](const Collider& collider) {
-        return std::holds_alternative<Box>(collider.shape);
-      }))
-    for (const SheetDefinition& sheet : scene.sheets) box_edges.emplace_back(sheet);
-}
-
 int Simulation::State::particle_count() const {
   int count = 0;
   for (const SheetDefinition& sheet : scene.sheets) count += sheet.particle_count();
@@ -327,7 +314,6 @@ void Simulation::State::release_memory() {
   for (MovingSheet& sheet : sheets) sheet.release_memory();
   cloth_contact.reset();
   open_seams.clear();
-  box_edges.clear();
   bodies.release_memory();
   released = true;
 }
@@ -337,7 +323,6 @@ void Simulation::State::restore_memory() {
   if (!released) return;
   for (std::size_t s = 0; s < sheets.size(); ++s) sheets[s].restore_memory(scene, capped(scene, s));
   make_cloth_contact();
-  find_box_edges();
   released = false;
 }
 

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "core/box_edges.h"
 #include "core/cloth_contact/cloth_contact.h"
 #include "core/contact/moving_bodies.h"
 #include "core/model/actions.h"
@@ -45,7 +44,6 @@ struct Simulation::State {
   std::vector<MovingSheet> sheets;
   std::optional<ClothContact> cloth_contact;
   std::vector<OpenSeams> open_seams;  // of each sheet, while they close
-  std::vector<BoxEdges> box_edges;    // of each sheet, where there are boxes
   MovingBodies bodies;
   std::vector<Grip> grips;  // their pins are among the scene's
   std::int64_t frame = 0;
@@ -63,7 +61,6 @@ struct Simulation::State {
   double time() const { return static_cast<double>(frame) * scene.solver.frame_step; }
   int particle_count() const;
   LeftOut at_open_seams() const;
-  void find_box_edges();
   void make_cloth_contact();
   Contacts contacts_of(std::size_t sheet, double time, double dt) const;
   void release_memory();

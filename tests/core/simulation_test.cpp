@@ -153,7 +153,9 @@ TEST(Simulation, APlanWarnsOfWhatTheModelLeavesOut) {
   EXPECT_EQ(warnings(scene), std::vector<std::string>{"NO_SELF_COLLISION"});
   scene.sheets.push_back(scene.sheets[0]);
   scene.sheets[1].name = "other";
+  scene.colliders = {{"table", Box{Vector3d::Zero(), Vector3d(1, 1, 1)}, 0.3, {}}};
   EXPECT_TRUE(warns(scene, "NO_SHEET_SHEET_COLLISION"));
+  EXPECT_TRUE(warns(scene, "BOX_EDGES"));
 }
 
 // Of the lowest particle that falls on a rail.

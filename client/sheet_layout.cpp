@@ -89,7 +89,7 @@ std::size_t triangle_count(const v1::SheetLayout& sheet) {
 }
 
 std::string simulated_text(int every) {
-  return every > 1 ? fmt::format(" (each {}. row and column simulated)", every) : "";
+  return every > 1 ? fmt::format(", each {}. row and column simulated", every) : "";
 }
 
 std::string shape_text(const v1::SheetLayout& sheet) {

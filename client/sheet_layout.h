@@ -26,7 +26,7 @@ bool needs_topology(const v1::StreamHeader& header);
 std::size_t particle_count(const v1::SheetLayout& sheet);
 std::size_t triangle_count(const v1::SheetLayout& sheet);
 
-// " (each 4. row and column simulated)" of a grid that frames interpolate; else nothing.
+// ", each 4. row and column simulated" of a grid that frames interpolate; else nothing.
 std::string simulated_text(int every);
 // "31 x 31 particles", "3546 particles, 6890 triangles"
 std::string shape_text(const v1::SheetLayout& sheet);

@@ -25,8 +25,8 @@ std::optional<double> seconds_of(const v1::Plan& plan, const v1::ServerStats& st
 std::string shape_text(const v1::Sheet& sheet) {
   if (sheet.has_grid()) {
     const v1::Grid& grid = sheet.grid();
-    return fmt::format("{} x {} particles{}, {:.4g} mm apart", grid.rows(), grid.columns(),
-                       simulated_text(grid.simulated_every()), grid.spacing_m() * 1e3);
+    return fmt::format("{} x {} particles, {:.4g} mm apart{}", grid.rows(), grid.columns(),
+                       grid.spacing_m() * 1e3, simulated_text(grid.simulated_every()));
   }
   const std::string& asset = sheet.triangles().asset();
   return asset.empty() ? "triangles" : "triangles of " + asset;

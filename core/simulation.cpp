@@ -64,8 +64,8 @@ FramePart Simulation::State::advance_frame(const Enough& enough, ThreadPool& poo
 
 // Takes those that the attempt has left; false: some still are, and it is enough.
 bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
-  constexpr int kParticles = 4096;  // whose substep takes longer than to ask
-  const std::int64_t turn = std::max(1, kParticles / particle_count());
+  constexpr int kParticles = 4096;  // whose substep takes longer than to ask, or any with contact
+  const std::int64_t turn = cloth_contact ? 1 : std::max(1, kParticles / particle_count());
   const double begin = time(), dt = plan.step.substep;
   constexpr std::int64_t kSettlings = 16;  // of a frame
   const std::int64_t settling = std::max<std::int64_t>(1, plan.step.substeps / kSettlings);

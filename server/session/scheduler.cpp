@@ -35,7 +35,7 @@ bool Scheduler::post(std::function<void()> work) {
   std::lock_guard lock(mutex_);
   if (stopping_ || posted_ >= kMaxPosted) return false;
   ++posted_;
-  push({nullptr, std::move(work), false});
+  push(posted_turns_, {nullptr, std::move(work), false});
   return true;
 }
 
@@ -43,19 +43,21 @@ bool Scheduler::help(std::function<void()> work) {
   std::lock_guard lock(mutex_);
   if (stopping_ || idle_ <= ready_.size()) return false;
   ++posted_;
-  push({nullptr, std::move(work), true});
+  push(posted_turns_, {nullptr, std::move(work), true});
   return true;
 }
 
-void Scheduler::push(Job job) {
+void Scheduler::push(std::int64_t& turns, Job job) {
   if (!job.helps) ++wanted_;
-  ready_.push_back(std::move(job));
+  turns = std::max(turns, turns_);
+  ready_.emplace(turns, std::move(job));
   changed_.notify_one();
 }
 
 Scheduler::Job Scheduler::pop() {
-  Job job = std::move(ready_.front());
-  ready_.pop_front();
+  auto next = ready_.extract(ready_.begin());
+  turns_ = std::max(turns_, next.key());
+  Job job = std::move(next.mapped());
   if (!job.helps) --wanted_;
   return job;
 }
@@ -92,7 +94,8 @@ void Scheduler::work() {
 // Precondition: the task is in no queue.
 void Scheduler::queue(std::shared_ptr<Task> task) {
   task->phase_ = Task::Phase::kQueued;
-  push({std::move(task), nullptr, false});
+  std::int64_t& turns = task->turns_;
+  push(turns, {std::move(task), nullptr, false});
 }
 
 void Scheduler::queue_due() {
@@ -109,18 +112,22 @@ void Scheduler::note_due() {
 }
 
 void Scheduler::run(std::unique_lock<std::mutex>& lock, Job job) {
+  const auto begin = Clock::now();
+  const auto turns = [&] { return std::max<std::int64_t>(1, (Clock::now() - begin) / kTurn); };
   if (job.work) {
     --posted_;
     lock.unlock();
     job.work();
     job.work = nullptr;  // what it holds is destroyed outside the lock
     lock.lock();
+    if (!job.helps) posted_turns_ += turns();
     return;
   }
   job.task->phase_ = Task::Phase::kRunning;
   lock.unlock();
   const auto due = job.task->run_slice();
   lock.lock();
+  job.task->turns_ += turns();
 
   if (job.task->phase_ == Task::Phase::kRunningAndWoken || (due && *due <= Clock::now())) {
     queue(std::move(job.task));

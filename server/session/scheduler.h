@@ -4,7 +4,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
-#include <deque>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <map>
@@ -29,14 +29,19 @@ class Task {
  private:
   friend class Scheduler;
   enum class Phase { kIdle, kWaiting, kQueued, kRunning, kRunningAndWoken };
-  Phase phase_ = Phase::kIdle;  // guarded by the scheduler
+  // guarded by the scheduler
+  Phase phase_ = Phase::kIdle;
+  std::int64_t turns_ = 0;  // that it has had
 };
 
-// A pool of threads. Runnable tasks take turns, one slice each, first come first served; tasks that
-// wait for a time join when it has come; idle ones cost nothing. All methods are thread-safe.
+// A pool of threads. Runnable tasks share their time: the one that has had the least of it runs a
+// slice, of equal ones the first to come; what one let pass while it had nothing to do is not made
+// up for. Posted work counts as one task. Tasks that wait for a time join when it has come; idle
+// ones cost nothing. All methods are thread-safe.
 class Scheduler {
  public:
   static constexpr std::size_t kMaxPosted = 256;
+  static constexpr std::chrono::microseconds kTurn{200};  // what a shorter slice counts as
 
   explicit Scheduler(int threads);
   ~Scheduler();  // stops
@@ -66,7 +71,7 @@ class Scheduler {
   };
 
   void work();
-  void push(Job job);
+  void push(std::int64_t& turns, Job job);
   Job pop();
   void note_due();
   void queue(std::shared_ptr<Task> task);
@@ -75,7 +80,9 @@ class Scheduler {
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Job> ready_;
+  std::multimap<std::int64_t, Job> ready_;  // by turns that the task has had
+  std::int64_t turns_ = 0;                  // of the last to run: others come with no fewer
+  std::int64_t posted_turns_ = 0;
   std::atomic<int> wanted_ = 0;  // jobs in ready_ that do not help
   std::size_t idle_ = 0;         // threads that wait
   std::size_t posted_ = 0;       // jobs in ready_ with work

@@ -17,7 +17,7 @@ Timeline::Timeline(Simulation given, std::int64_t max_frame_work, Duration snaps
 }
 
 FramePart Timeline::advance(Scheduler& scheduler) {
-  constexpr std::chrono::microseconds kSlice{20'000}, kBusySlice{200};
+  constexpr std::chrono::microseconds kSlice{20'000}, kBusySlice = Scheduler::kTurn;
   const auto begin = Clock::now();
   auto yielded = begin;
   const Enough enough = [&] {

@@ -24,6 +24,7 @@ constexpr std::array kTests{
     Test{"real-time", weft::stress::real_time},
     Test{"fan-out", weft::stress::fan_out},
     Test{"long-frames", weft::stress::long_frames},
+    Test{"contact", weft::stress::contacts},
     Test{"churn", weft::stress::churn},
     Test{"slow-readers", weft::stress::slow_readers},
     Test{"view-age", weft::stress::view_age},

@@ -19,6 +19,7 @@ Outcome lossless(Form form);
 Outcome real_time(Form form);
 Outcome fan_out(Form form);
 Outcome long_frames(Form form);
+Outcome contacts(Form form);
 Outcome churn(Form form);
 Outcome slow_readers(Form form);
 Outcome view_age(Form form);

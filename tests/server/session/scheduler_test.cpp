@@ -5,32 +5,13 @@
 #include <atomic>
 #include <future>
 #include <latch>
-#include <string>
+#include <thread>
 
 namespace weft::testing {
 namespace {
 
 using namespace std::chrono_literals;
 using ::testing::ElementsAre;
-
-// Notes its letter for each slice, and wants as many as it is given.
-class Letter : public Task {
- public:
-  Letter(char letter, int slices, std::string& log, std::latch& done)
-      : letter_(letter), slices_(slices), log_(log), done_(done) {}
-  std::optional<Clock::time_point> run_slice() override {
-    log_ += letter_;
-    if (--slices_ > 0) return Clock::time_point::min();
-    done_.count_down();
-    return std::nullopt;
-  }
-
- private:
-  char letter_;
-  int slices_;
-  std::string& log_;
-  std::latch& done_;
-};
 
 class Lambda : public Task {
  public:
@@ -42,18 +23,44 @@ class Lambda : public Task {
   std::function<std::optional<Clock::time_point>()> slice_;
 };
 
-TEST(Scheduler, GivesBusyTasksTurnsOfOneSlice) {
-  std::string log;
-  std::latch done(3);
+TEST(Scheduler, LetsTasksOfShortSlicesRunMoreOfThem) {
+  constexpr int kShort = 60;
   Scheduler scheduler(1);
-  std::promise<void> begin;
-  ASSERT_TRUE(scheduler.post([wait = begin.get_future().share()] { wait.wait(); }));
-  for (const char letter : {'a', 'b', 'c'}) {
-    scheduler.wake(std::make_shared<Letter>(letter, 3, log, done));
-  }
-  begin.set_value();
-  done.wait();
-  EXPECT_EQ(log, "abcabcabc");
+  int longs = 0, shorts = 0;
+  std::promise<int> done;
+  const auto slow = std::make_shared<Lambda>([&]() -> std::optional<Clock::time_point> {
+    std::this_thread::sleep_for(20 * Scheduler::kTurn);
+    ++longs;
+    return Clock::time_point::min();
+  });
+  const auto fast = std::make_shared<Lambda>([&]() -> std::optional<Clock::time_point> {
+    if (++shorts < kShort) return Clock::time_point::min();
+    done.set_value(longs);
+    return std::nullopt;
+  });
+  scheduler.wake(slow);
+  scheduler.wake(fast);
+  EXPECT_LT(done.get_future().get(), kShort / 2);
+  scheduler.stop();
+}
+
+TEST(Scheduler, LetsATaskOfLongSlicesGoOnBesideBusyOnesAndPostedWork) {
+  Scheduler scheduler(1);
+  std::promise<void> done;
+  const auto busy = std::make_shared<Lambda>([] { return Clock::time_point::min(); });
+  std::function<void()> again = [&] { (void)scheduler.post(again); };
+  const auto slow =
+      std::make_shared<Lambda>([&, left = 3]() mutable -> std::optional<Clock::time_point> {
+        std::this_thread::sleep_for(20 * Scheduler::kTurn);
+        if (--left > 0) return Clock::time_point::min();
+        done.set_value();
+        return std::nullopt;
+      });
+  scheduler.wake(busy);
+  scheduler.wake(slow);
+  ASSERT_TRUE(scheduler.post(again));
+  EXPECT_EQ(done.get_future().wait_for(60s), std::future_status::ready);
+  scheduler.stop();
 }
 
 TEST(Scheduler, RunsATaskOnOneThreadAtATimeHoweverOftenItIsWoken) {

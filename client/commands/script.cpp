@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <atomic>
+#include <exception>
 #include <future>
 #include <map>
 #include <mutex>
@@ -53,9 +54,9 @@ void answer_plan(Context& context, const Script& script) {
                              count_of(steps, "step"), text));
 }
 
-// As many cases at a time as the script says; what ends one for good ends all.
-std::vector<CaseResult> perform_all(Context& context, const Script& script, bool replace) {
-  std::vector<CaseResult> results(script.cases.size());
+// As many cases at a time as the script says; what ends one for good ends all, and is thrown.
+void perform_all(Context& context, const Script& script, bool replace,
+                 std::vector<CaseResult>& results) {
   std::vector<std::string> lines(script.cases.size());
   Status status(context.terminal.err, context.terminal.err_is_watched);
   Connection& connection = context.connection();
@@ -79,7 +80,7 @@ std::vector<CaseResult> perform_all(Context& context, const Script& script, bool
         ended = true;
         throw;
       }
-      if (results[i].interrupted) ended = true;
+      if (!results[i].ended) ended = true;
       show("");
     }
   };
@@ -87,7 +88,6 @@ std::vector<CaseResult> perform_all(Context& context, const Script& script, bool
   for (int i = 0; i < script.parallel; ++i) workers.push_back(std::async(std::launch::async, work));
   for (auto& worker : workers) worker.wait();
   for (auto& worker : workers) worker.get();
-  return results;
 }
 
 void run_script(Context& context, const ScriptOptions& options) {
@@ -95,8 +95,13 @@ void run_script(Context& context, const ScriptOptions& options) {
   check_script(context.connection(), script, options.replace);
   if (options.dry_run) return answer_plan(context, script);
 
-  const std::vector<CaseResult> results = perform_all(context, script, options.replace);
-  if (context.stop.stop_requested()) throw interrupted();
+  std::vector<CaseResult> results(script.cases.size());
+  std::exception_ptr end;
+  try {
+    perform_all(context, script, options.replace, results);
+  } catch (const Problem&) {
+    end = std::current_exception();
+  }
   if (!options.junit.empty()) {
     OutputFile file(options.junit);
     file.write(report_junit(script, results));
@@ -104,6 +109,8 @@ void run_script(Context& context, const ScriptOptions& options) {
   }
   context.answer(report_json(script, results),
                  report_text(script, results, context.terminal.columns));
+  if (end) std::rethrow_exception(end);
+  if (context.stop.stop_requested()) throw interrupted();
   std::size_t failed = 0;
   for (const CaseResult& result : results) failed += result.passed() ? 0 : 1;
   if (failed == 0) return;
@@ -154,7 +161,8 @@ expect   frame, time_s, at_rest, rest_time_s; largest_strain, of all frames;
 Each has `session`, a name within the case, needed only where there are several;
 run takes a list of them. A step may be a loop: {for: {...}, steps: [...]}.
 $NAME and $(NAME) stand for variables, $case for the case's name. Paths are
-relative to the script. Sessions end with their case.)";
+relative to the script. Sessions end with their case. What is interrupted, by
+Ctrl-C or a connection that is lost, still reports the cases that are over.)";
 
 }  // namespace
 

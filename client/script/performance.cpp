@@ -109,6 +109,7 @@ class Performer {
 
   CaseResult perform() {
     const auto start = std::chrono::steady_clock::now();
+    result_.ended = true;
     for (const Step& step : case_.steps) {
       progress_(
           fmt::format("step {} of {}: {}", result_.steps_done + 1, case_.steps.size(), step.kind));
@@ -148,7 +149,10 @@ class Performer {
       return true;
     } catch (const Problem& problem) {
       if (problem.exit == Exit::kNoConnection) throw;
-      result_.interrupted = result_.interrupted || problem.exit == Exit::kInterrupted;
+      if (problem.exit == Exit::kInterrupted) {
+        result_.ended = false;
+        return false;
+      }
       std::string message = problem.what();
       for (const auto& [field, description] : problem.violations)
         message += fmt::format("; {}: {}", field, description);

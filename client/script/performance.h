@@ -42,9 +42,9 @@ struct CaseResult {
   std::vector<Failure> failures;
   std::vector<std::string> recordings;
   std::chrono::duration<double> wall{};
-  bool interrupted = false;
+  bool ended = false;  // by itself; otherwise it was interrupted, or never begun
 
-  bool passed() const { return failures.empty() && !interrupted; }
+  bool passed() const { return failures.empty() && ended; }
 };
 
 // Performs the steps of a case on sessions of its own, which it deletes in the end. A step that

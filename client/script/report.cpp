@@ -21,7 +21,7 @@ Json bound(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 std::int64_t failed(const std::vector<CaseResult>& results) {
   std::int64_t count = 0;
-  for (const CaseResult& result : results) count += result.passed() ? 0 : 1;
+  for (const CaseResult& result : results) count += result.failures.empty() ? 0 : 1;
   return count;
 }
 
@@ -33,7 +33,11 @@ std::string report_text(const Script& script, const std::vector<CaseResult>& res
   std::string failures;
   for (std::size_t i = 0; i < results.size(); ++i) {
     const CaseResult& result = results[i];
-    table.add({script.cases[i].name, result.passed() ? "passed" : "FAILED",
+    const bool failed = !result.failures.empty();
+    table.add({script.cases[i].name,
+               failed         ? "FAILED"
+               : result.ended ? "passed"
+                              : "interrupted",
                fmt::format("{} of {}", result.steps_done, script.cases[i].steps.size()),
                fmt::format("{:.1f} s", result.wall.count())});
     for (const Failure& failure : result.failures)
@@ -73,6 +77,7 @@ Json report_json(const Script& script, const std::vector<CaseResult>& results) {
     cases.push_back({{"name", script.cases[i].name},
                      {"values", std::move(values)},
                      {"passed", result.passed()},
+                     {"interrupted", !result.ended},
                      {"steps_done", result.steps_done},
                      {"steps", script.cases[i].steps.size()},
                      {"wall_s", result.wall.count()},
@@ -105,6 +110,8 @@ std::string report_junit(const Script& script, const std::vector<CaseResult>& re
       child.append_attribute("message").set_value(failure.message.c_str());
       child.text().set(failure_text(script, failure).c_str());
     }
+    if (!results[i].ended)
+      test.append_child("skipped").append_attribute("message").set_value("interrupted");
   }
   std::ostringstream text;
   document.save(text, "  ");

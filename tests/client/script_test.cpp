@@ -447,5 +447,36 @@ steps:
   EXPECT_EQ(weft({"verify", path("cloth.weft")}).exit, 0);
 }
 
+TEST_F(ScriptTest, AStopStillTellsOfTheCasesThatAreOver) {
+  const std::string file = script(R"(
+for: {last: [2, 900000000, 3]}
+steps:
+  - create: {scene: scene.json}
+  - run: {until_frame: $last}
+)");
+  std::stop_source stop;
+  Outcome outcome;
+  std::thread running([&] {
+    outcome = weft({"script", file, "--junit", path("cloth.xml"), "--json"}, stop.get_token());
+  });
+  const auto is_running = [&] {
+    const auto list = ask({"session", "list"})["sessions"];
+    return !list.empty() && list[0]["frame"] > 3;
+  };
+  while (!is_running()) std::this_thread::yield();
+  stop.request_stop();
+  running.join();
+  EXPECT_EQ(outcome.exit, 130);
+  const auto cases = nlohmann::json::parse(outcome.out)["cases"];
+  EXPECT_TRUE(cases[0]["passed"]);
+  EXPECT_TRUE(cases[1]["interrupted"]);
+  EXPECT_EQ(cases[1]["steps_done"], 1);
+  EXPECT_TRUE(cases[2]["interrupted"]);
+  EXPECT_EQ(cases[2]["steps_done"], 0);
+  const std::string junit = read_file(path("cloth.xml"));
+  EXPECT_THAT(junit, HasSubstr("failures=\"0\""));
+  EXPECT_THAT(junit, HasSubstr("<skipped message=\"interrupted\""));
+}
+
 }  // namespace
 }  // namespace weft::testing

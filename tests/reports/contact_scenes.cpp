@@ -247,7 +247,9 @@ std::vector<ContactScene> contact_scenes(bool large) {
            twisted_tube(turns, 2 * turns), 2 * turns + 0.2},
           {"knot", "a ribbon along a knot is pulled", knotted(), 2.5},
           {"cloth pulled", "a cloth is drawn from under three napkins", drawn_away(), 1.2},
-          {"layers", "two layers on a ball that moves", two_layers(n), 3}};
+          {"layers", "two layers on a ball that moves", two_layers(n), 3},
+          {"ball", "a sheet falls onto a ball", draped(2 * n - 1), 1},
+          {"stack", "ten sheets fall onto a ball", stacked(n), 1}};
 }
 
 }  // namespace weft::reports

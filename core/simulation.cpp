@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "core/cloth_contact/cuts.h"
-#include "core/cloth_contact/near_blocks.h"
 #include "core/cloth_contact/tangles.h"
 #include "core/contact/contact.h"
 #include "core/forces/air.h"
@@ -24,14 +23,35 @@ NextStates& next_states(std::size_t sheets) {
   return states;
 }
 
-// Edges that pass through triangles where the scene starts.
-std::int64_t cuts_at_start(const Scene& scene, const LeftOut& left_out) {
-  const Cloth cloth(scene.sheets, left_out);
-  Matrix3Xd x;
-  cloth.join([&](std::size_t s) { return start_positions(scene.sheets[s]); }, x);
-  NearBlocks blocks(cloth);
-  blocks.set(x);
-  return count_cuts(cloth, blocks, x, 0).count;
+// Of triangles at open seams, those that start through another sheet, or that it starts through; of
+// a sheet where one starts so through the sheet itself, all.
+LeftOut through_cloth_at_start(const Scene& scene, const LeftOut& open) {
+  constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+  std::vector<Matrix3Xd> x;
+  LeftOut through;
+  for (const SheetDefinition& sheet : scene.sheets) {
+    x.push_back(start_positions(sheet));
+    through.emplace_back(static_cast<std::size_t>(triangle_count(sheet.shape)));
+  }
+  const auto note = [&](std::size_t s, const auto& particles, bool within) {
+    const auto triangles = triangles_of(scene.sheets[s].shape);
+    std::vector<std::size_t> having;
+    for (std::size_t t = 0; t < triangles.size(); ++t)
+      if (std::ranges::all_of(particles, [&](int particle) {
+            return std::ranges::find(triangles[t], particle) != triangles[t].end();
+          }))
+        having.push_back(t);
+    if (open[s].empty() || !std::ranges::all_of(having, [&](std::size_t t) { return open[s][t]; }))
+      return;
+    if (within) through[s] = open[s];
+    for (const std::size_t t : having) through[s][t] = true;
+  };
+  for (const ClothCut& cut : count_cuts(scene.sheets, x, kAll).first) {
+    const bool within = cut.edge_sheet == cut.triangle_sheet;
+    note(cut.edge_sheet, cut.edge, within);
+    note(cut.triangle_sheet, cut.triangle, within);
+  }
+  return through;
 }
 
 }  // namespace
@@ -283,15 +303,15 @@ Simulation::State::State(Scene given, SolverFactory factory)
   forget_motion();
 }
 
-// Triangles that reach from one panel to another may pass through what lies between: where one
-// starts so, cloth contact leaves all of them out.
+// Triangles that reach from one panel to another may start through what lies between: cloth contact
+// leaves these out.
 void Simulation::State::make_cloth_contact() {
   LeftOut open = at_open_seams();
   open_seams.clear();
   if (!scene.colliders.empty())
     for (std::size_t s = 0; s < open.size(); ++s) open_seams.emplace_back(scene.sheets[s], open[s]);
   if (!scene.cloth_contact) return;
-  if (!open.empty() && cuts_at_start(scene, {}) == cuts_at_start(scene, open)) open.clear();
+  if (!open.empty()) open = through_cloth_at_start(scene, open);
   cloth_contact.emplace(scene, open);
 }
 

@@ -193,8 +193,8 @@ void run_drape(Context& context, const DrapeOptions& options) {
   const std::vector<v1::Warning> start = faults_of_start(session.plan());
   for (const v1::Warning& warning : start) document["start"].push_back(to_json(warning));
   std::string text = made.text + verdict_text(verdict, start, result.tally);
-  write_files(options, made.scene.sheets(0).name(), recorded, result.tally.last_frame, document,
-              text);
+  write_files(options, made.scene.sheets().rbegin()->name(), recorded, result.tally.last_frame,
+              document, text);
   context.answer(document, text);
   if (!verdict.good()) throw not_good(verdict);
 }
@@ -211,12 +211,18 @@ void add_drape(CLI::App& app, Context& context) {
       ->option_text(" ")
       ->required();
   add_person(*command, options->person);
+  CLI::Option* bodies =
+      command
+          ->add_option("--body", options->drape.bodies,
+                       "Closed triangles that wear it instead of the dress form: .obj, .gltf or "
+                       ".glb; may be given again")
+          ->type_name("FILE")
+          ->allow_extra_args(false);
   command
-      ->add_option("--body", options->drape.bodies,
-                   "Closed triangles that wear it instead of the dress form: .obj, .gltf or .glb; "
-                   "may be given again")
+      ->add_option("--over", options->drape.over,
+                   "Recording of a drape, whose body wears it over what it wears there")
       ->type_name("FILE")
-      ->allow_extra_args(false);
+      ->excludes(bodies);
   command
       ->add_option(
           "--textile", options->textile,
@@ -256,6 +262,8 @@ the highest border, are held up meanwhile. It ends at rest with a verdict, and
 exit code 1 where that is not good. On a server that is named the session stays.
   weft drape tshirt --size 40 -o tshirt.glb --page tshirt.html
   weft drape pattern.json --body body.obj --textile denim_11oz -o out.glb
+  weft drape trousers --size 40 --recording trousers.weft
+  weft drape shirt --size 40 --over trousers.weft --page dressed.html
 )");
   command->callback([&context, options] { run_drape(context, *options); });
 }

@@ -1,9 +1,13 @@
 #include "client/garments/drape.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
+#include <utility>
 
 #include "client/garments/garment_templates.h"
+#include "client/garments/layers.h"
 #include "client/garments/pattern_file.h"
 #include "client/message_field.h"
 #include "client/output/text.h"
@@ -39,7 +43,8 @@ GarmentScene make_drape(Connection& connection, const Drape& drape) {
       .edge_field = drape.edge_field};
   std::string notes;
   std::optional<DressForm> form;
-  if (own || drape.bodies.empty()) form = make_dress_form(drape.measures);
+  const bool on_form = drape.bodies.empty() && drape.over.empty();
+  if (own || on_form) form = make_dress_form(drape.measures);
   if (own) {
     order.name = drape.garment;
     order.pattern = make_garment(drape.garment, *form);
@@ -50,11 +55,19 @@ GarmentScene make_drape(Connection& connection, const Drape& drape) {
     order.pattern = std::move(read.pattern);
     for (const std::string& note : read.notes) notes += note + '\n';
   }
+  v1::Scene worn;
+  if (!drape.over.empty()) {
+    worn = worn_at_end(drape.over);
+    if (const double way = place_over(order.pattern, worn); way > 0)
+      notes += fmt::format("panels start up to {:.0f} mm farther out, clear of what is worn\n",
+                           1000 * way);
+  }
   for (const std::string& path : drape.bodies) order.bodies.push_back(garment_body(path));
-  if (drape.bodies.empty()) order.bodies.push_back(garment_body(*form));
+  if (on_form) order.bodies.push_back(garment_body(*form));
 
   GarmentScene made = make_garment_scene(connection, order);
   made.text.insert(0, notes);
+  if (!drape.over.empty()) wear_over(made.scene, std::move(worn));
   if (drape.accuracy) made.scene.mutable_solver()->set_accuracy(*drape.accuracy);
   for (const auto& [place, value] : drape.values) set_field(made.scene, place, value);
   return made;

@@ -16,6 +16,7 @@ struct Drape {
   std::string garment{};                 // a template, or a pattern file
   Measures measures{};                   // of the dress form
   std::vector<std::string> bodies{};     // files; none: the dress form
+  std::string over{};                    // a recording of what is worn beneath, and by whom
   std::optional<v1::Textile> textile{};  // none: the usual one
   std::optional<double> edge_m{}, deflate_m{};
   std::optional<v1::Accuracy> accuracy{};

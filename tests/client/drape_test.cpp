@@ -6,6 +6,7 @@
 #include "client/garments/pattern_file.h"
 #include "client/recording/points.h"
 #include "client/recording/reader.h"
+#include "client/sheet_layout.h"
 #include "tests/client/client_test.h"
 
 namespace weft::testing {
@@ -104,6 +105,41 @@ TEST_F(Drape, OfWhatFitsIsGoodAndIsWritten) {
   EXPECT_THAT(run_weft({"info", path("tube.weft")}).out, HasSubstr("verdict           good"));
   for (const char* file : {"tube.glb", "tube.html", "tube.weft"})
     EXPECT_TRUE(std::filesystem::exists(path(file))) << file;
+}
+
+TEST_F(Drape, OverWhatIsWornStaysOutsideOfIt) {
+  ASSERT_EQ(drape(0.62, {"--recording", path("tube.weft")}).exit, 0);
+  const auto over = [&](const std::string& beneath, std::vector<std::string> options) {
+    std::vector<std::string> arguments{"drape", path("tube.json"), "--over",
+                                       beneath, "--edge",          "0.03"};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return run_weft(arguments);
+  };
+  // its panels would start within the tube that is worn
+  write_file(path("tube.json"), client::pattern_text(tube_pattern(0.65, 0.1)));
+  const Outcome outcome =
+      over(path("tube.weft"), {"--recording", path("both.weft"), "--seconds", "2", "--json"});
+  EXPECT_EQ(outcome.json()["verdict"]["cloth_cut_count"], 0) << outcome.err;
+  client::RecordingReader recording(path("both.weft"));
+  ASSERT_EQ(recording.header().sheets_size(), 2);
+  EXPECT_EQ(recording.header().sheets(0).name(), "tube");
+  EXPECT_EQ(recording.header().sheets(1).name(), "tube-2");
+  const v1::Frame end = recording.read(recording.last_frame());
+  const auto radii = [&](int sheet) {
+    const std::size_t first = sheet == 0 ? 0 : client::particle_count(recording.header().sheets(0));
+    const client::Points points =
+        client::read_points(end.positions_m(), recording.header(), first,
+                            client::particle_count(recording.header().sheets(sheet)));
+    std::vector<double> all;
+    for (std::size_t i = 0; i < points.x.size(); ++i)
+      all.push_back(std::hypot(points.x[i], points.z[i]));
+    return all;
+  };
+  EXPECT_GT(std::ranges::min(radii(1)), std::ranges::max(radii(0)));
+
+  EXPECT_THAT(over(path("tube.weft"), {"--body", path("pole.obj")}).err,
+              HasSubstr("--body excludes --over"));
+  EXPECT_THAT(over(path("pole.obj"), {}).err, HasSubstr("pole.obj: "));
 }
 
 TEST_F(Drape, OfWhatIsTooWideSlidesDownAndIsNotGood) {

@@ -51,9 +51,7 @@ void PairLists::look(const Matrix3Xd& x, const Came& came, double spare) {
   }
   meet(came, spare);
   before_ = x;
-  before_about_.resize(4, x.cols());
-  before_about_.topRows<3>() = x.cast<float>();
-  before_about_.row(3).setZero();
+  before_about_ = blocks_.places();
 
   lasts_ = kMostMotion * thickest;
   near_ = 0;
@@ -216,10 +214,19 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
 void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& state, List& list) {
   if (list.made_at.cols() > 0) state.left = list.reach - change(x, state.blocks, list);
   if (state.left >= least) return;
+  constexpr int kMostBent = 7;
   list = {};
   state.has_some = state.is_near = false;
   state.near_left = -1;
-  state.left = blocks_.distance(state.blocks, cloth_.thickest + least) - cloth_.thickest;
+  // what is bent stays so for a while
+  if (state.bent > 0) {
+    --state.bent;
+    state.left = blocks_.gap(state.blocks) - cloth_.thickest;
+  } else {
+    state.left = blocks_.distance(state.blocks, cloth_.thickest + least) - cloth_.thickest;
+    state.bent_for = state.left >= least ? 0 : std::min(2 * state.bent_for + 1, kMostBent);
+    state.bent = state.bent_for;
+  }
   if (state.left >= least) return;
   state.left = list.reach = reach;
   place(x, state.blocks, list.made_at);

@@ -53,6 +53,7 @@ class PairLists {
     double left = -1, near_left = -1;  // of the reach of all, and of what is near, m
     double came = 0;                   // in the window, m
     bool has_some = false, is_near = false;
+    int bent = 0, bent_for = 0;  // how often it is not asked whether they lie flat
   };
   struct List {
     double reach = 0;        // when it was made, m

@@ -170,25 +170,16 @@ std::map<BlockPair, ClothPairs> all_pairs(const Cloth& cloth) {
 ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
                       const Matrix3Xd& x, double reach) {
   ClothPairs some, found;
-  const auto corners = [&](int from, int triangle) {
-    const auto f = static_cast<std::size_t>(from);
-    for (int k = cloth.first_corner[f]; k < cloth.first_corner[f + 1]; ++k) {
-      const int i = cloth.corners[static_cast<std::size_t>(k)];
-      if (!has(corners_of(cloth, triangle), i)) some.corners.push_back({i, triangle});
-    }
+  const double boxes_within = cloth.thickest + reach;
+  const auto add_corners = [&](int one, int other) {
+    for (const ClothPair& pair : near.near_corners(one, other, boxes_within))
+      if (!has(corners_of(cloth, pair.second), pair.first)) some.corners.push_back(pair);
   };
-  const auto edges = [&](int one, int other) {
-    const auto s = static_cast<std::size_t>(one), t = static_cast<std::size_t>(other);
-    for (int e = cloth.first_edge[s]; e < cloth.first_edge[s + 1]; ++e)
-      for (int f = cloth.first_edge[t]; f < cloth.first_edge[t + 1]; ++f)
-        if (!share_end(ends_of(cloth, e), ends_of(cloth, f)))
-          some.edges.push_back({std::min(e, f), std::max(e, f)});
-  };
-  near.for_each_near(blocks, cloth.thickest + reach, [&](int one, int other) {
-    corners(one, other);
-    corners(other, one);
-    edges(one, other);
-  });
+  add_corners(blocks.one, blocks.other);
+  if (blocks.one != blocks.other) add_corners(blocks.other, blocks.one);
+  for (const ClothPair& pair : near.near_edges(blocks, boxes_within))
+    if (!share_end(ends_of(cloth, pair.first), ends_of(cloth, pair.second)))
+      some.edges.push_back(pair);
   for_each_distance(
       false, some.corners, [&](const ClothPair& pair) { return particles_of_corner(cloth, pair); },
       x,

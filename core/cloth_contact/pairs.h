@@ -1,19 +1,12 @@
 #pragma once
 
 #include <array>
-#include <compare>
 #include <map>
 #include <vector>
 
 #include "core/cloth_contact/near_blocks.h"
 
 namespace weft {
-
-// Numbers of a particle and a triangle, or of two edges.
-struct ClothPair {
-  int first = 0, second = 0;
-  auto operator<=>(const ClothPair&) const = default;
-};
 
 // Pairs of cloth that share no particle, in ascending order.
 struct ClothPairs {

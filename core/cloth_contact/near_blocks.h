@@ -53,8 +53,8 @@ class NearBlocks {
   // axis; in ascending order.
   std::vector<BlockPair> meet(double reach);
   // Shares out every two blocks of two nodes, or of one and every block with itself: calls
-  // is_far(one, other, gap of their boxes, m) for nodes, and where that is false for their halves;
-  // near(blocks) for what is left.
+  // is_far(one, other, gap of their boxes, m) for nodes, or for one and itself, and where that is
+  // false for their halves; near(blocks) for what is left.
   template <class IsFar, class Near>
   void share_out(const Node& one, const Node& other, const IsFar& is_far, const Near& near) {
     box_node(one);
@@ -69,11 +69,18 @@ class NearBlocks {
   // The least distance between what shares no particle in two blocks, at least, m; 0 where that
   // takes a closer look. The closest is not looked for where it is `enough`.
   double distance(const BlockPair& blocks, double enough = 0);
-  // That between the boxes of nodes, along the axis on which they are farthest apart, m.
-  double distance(const Node& one, const Node& other) {
+  // The same of all blocks of two nodes, or of one, m.
+  double distance(const Node& one, const Node& other, double enough) {
     box_node(one);
     box_node(other);
-    return gap(box(one), box(other));
+    const double between = gap(box(one), box(other));
+    return between >= enough ? between : std::max(between, distance_if_flat(one, other));
+  }
+  // 0 where they do not lie flat together, m.
+  double distance_if_flat(const Node& one, const Node& other) {
+    constexpr int kMost = 64;  // blocks
+    if (one.count() + other.count() > kMost) return 0;
+    return flat_.distance({one.first, one.last}, {other.first, other.last});
   }
   // All of two blocks whose boxes are no farther apart than `reach`, m, and some that are, until it
   // is called again: two triangles; two edges; a particle of the one and a triangle of the other.
@@ -111,6 +118,7 @@ class NearBlocks {
   template <class IsFar, class Near>
   void share_out_within(const Node& node, const IsFar& is_far, const Near& near) {
     if (node.count() == 1) return near(BlockPair{node.first, node.first});
+    if (is_far(node, node, gap(box(node), box(node)))) return;
     share_out_within(node.half(0), is_far, near);
     share_out_within(node.half(1), is_far, near);
     share_out_between(node.half(0), node.half(1), is_far, near);

@@ -61,7 +61,7 @@ void PairLists::look(const Matrix3Xd& x, const Came& came, double spare) {
     // shares no particle there is 2.8 thicknesses apart
     const double comes = state.came = came(number(state.blocks.one), number(state.blocks.other));
     if (!(state.left >= comes + spare))
-      renew(x, comes + std::min(2 * comes, 0.5 * thickest) + 0.1 * thickest,
+      renew(x, least_left(comes),
             std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + 3 * spare, state,
             lists_[k]);
     if (state.has_some && !(state.near_left >= comes + spare / 2))
@@ -97,7 +97,8 @@ void PairLists::look(const Places& now, double come) {
     const auto& [one, other, left_then] = apart_[k];
     double left = left_then - since_.between(one.number, other.number);
     if (left < come && look_closer())
-      left = blocks_.distance(one, other) - cloth_.thickest - rounding;
+      left = blocks_.distance(one, other, cloth_.thickest + come + rounding) - cloth_.thickest -
+             rounding;
     lasts_ = std::min(lasts_, left);
   }
 }
@@ -117,11 +118,19 @@ double PairLists::left_at(const Matrix3Xd& x, const State& state, const List& li
 template <class Came>
 void PairLists::meet(const Came& came, double spare) {
   constexpr double kApart = 1.5;  // of the thickest cloth, beside what it comes
-  const bool all = before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_;
+  constexpr int kMostLooks = 64;  // until others may lie flat together
+  const bool all = before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_ ||
+                   ++looks_ == kMostLooks;
+  if (all) looks_ = 0;
   std::vector<BlockPair> met;
   const auto is_far = [&](const NearBlocks::Node& one, const NearBlocks::Node& other, double gap) {
-    const double left = gap - cloth_.thickest;
-    if (left < came(one.number, other.number) + kApart * cloth_.thickest) return false;
+    const double comes = came(one.number, other.number);
+    double left = gap - cloth_.thickest;
+    if (left < comes + kApart * cloth_.thickest) {
+      if (one.count() + other.count() == 2) return false;
+      left = blocks_.distance_if_flat(one, other) - cloth_.thickest;
+      if (left < least_left(comes) + spare) return false;
+    }
     still_apart_.push_back({one, other, left});
     return true;
   };
@@ -140,6 +149,11 @@ void PairLists::meet(const Came& came, double spare) {
   std::sort(met.begin(), met.end());
   if (all || !met.empty()) add(met, all);
   if (all) met_ = apart_.size() + states_.size();
+}
+
+// Of what is looked at anew, where particles come so far in a window, m.
+double PairLists::least_left(double come) const {
+  return come + std::min(2 * come, 0.5 * cloth_.thickest) + 0.1 * cloth_.thickest;
 }
 
 double PairLists::length(double came) const {

@@ -60,7 +60,8 @@ class PairLists {
     Matrix3Xd made_at = {};  // of the particles of both blocks, m; or empty
     Candidates all = {}, near = {};
   };
-  // Nodes of blocks that are so far apart that no two of their blocks have a list.
+  // Nodes of blocks that are so far apart, or lie so flat together, that no two of their blocks have
+  // a list.
   struct Apart {
     NearBlocks::Node one, other;
     double left;  // until they may be near, m
@@ -71,6 +72,7 @@ class PairLists {
   template <class Came>
   void meet(const Came& came, double spare);
   void add(const std::vector<BlockPair>& met, bool only);
+  double least_left(double come) const;
   double length(double came) const;  // no more than kMostMotion
   int number(int block) const { return blocks_.number(block); }
   void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
@@ -87,6 +89,7 @@ class PairLists {
   double lasts_ = -1;    // m
   std::vector<Apart> apart_, still_apart_;
   std::size_t met_ = 0;        // of them and of states, when all were looked for
+  int looks_ = 0;              // since then
   std::vector<State> states_;  // in ascending order of blocks
   std::vector<List> lists_;    // of these
   std::size_t near_ = 0;       // lists that have some

@@ -14,7 +14,7 @@ void PairLists::forget() {
   before_ = {};
   before_about_ = {};
   states_ = {};
-  lists_ = {};
+  lists_ = decltype(lists_)();
   apart_ = still_apart_ = {};
   since_.forget();
   in_window_.forget();
@@ -63,9 +63,9 @@ void PairLists::look(const Matrix3Xd& x, const Came& came, double spare) {
     if (!(state.left >= comes + spare))
       renew(x, least_left(comes),
             std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + 3 * spare, state,
-            lists_[k]);
+            *lists_[k]);
     if (state.has_some && !(state.near_left >= comes + spare / 2))
-      prune(x, comes + std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest), state, lists_[k]);
+      prune(x, comes + std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest), state, *lists_[k]);
     lasts_ = std::min(lasts_, state.has_some ? state.near_left : state.left);
     if (state.is_near) ++near_;
   }
@@ -90,7 +90,7 @@ void PairLists::look(const Places& now, double come) {
     const double by = since_.between(number(state.blocks.one), number(state.blocks.other));
     double left = (state.has_some ? state.near_left : state.left) - by;
     if (left < come && look_closer())
-      left = left_at(now_all_, state, lists_[k], state.left - by, come + rounding) - rounding;
+      left = left_at(now_all_, state, *lists_[k], state.left - by, come + rounding) - rounding;
     lasts_ = std::min(lasts_, left);
   }
   for (std::size_t k = 0; k < apart_.size() && lasts_ >= come; ++k) {
@@ -204,7 +204,9 @@ double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List
 // Adds blocks that have met, in their order; of the lists before it keeps all, or only theirs.
 void PairLists::add(const std::vector<BlockPair>& met, bool only) {
   const std::vector<State> old_states = std::exchange(states_, {});
-  std::vector<List> old_lists = std::exchange(lists_, {});
+  std::vector<std::unique_ptr<List>> old_lists = std::exchange(lists_, {});
+  states_.reserve(old_states.size() + met.size());
+  lists_.reserve(old_states.size() + met.size());
   std::size_t known = 0;
   const auto keep = [&] {
     states_.push_back(old_states[known]);
@@ -218,7 +220,7 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
       ++known;
     } else {
       states_.push_back({blocks});
-      lists_.emplace_back();
+      lists_.push_back(std::make_unique<List>());
     }
   }
   if (only) return;

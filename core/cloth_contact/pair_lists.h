@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/cloth_contact/block_motion.h"
@@ -43,7 +44,7 @@ class PairLists {
   template <class F>
   void for_each_list(const F& f) const {
     for (std::size_t k = 0; k < states_.size(); ++k)
-      if (states_[k].is_near) f(states_[k].blocks, lists_[k].near, states_[k].came);
+      if (states_[k].is_near) f(states_[k].blocks, lists_[k]->near, states_[k].came);
   }
 
  private:
@@ -91,7 +92,7 @@ class PairLists {
   std::size_t met_ = 0;        // of them and of states, when all were looked for
   int looks_ = 0;              // since then
   std::vector<State> states_;  // in ascending order of blocks
-  std::vector<List> lists_;    // of these
+  std::vector<std::unique_ptr<List>> lists_;  // of these
   std::size_t near_ = 0;       // lists that have some
   BlockMotion since_, in_window_;
   Matrix3Xd now_, now_all_;

@@ -38,6 +38,7 @@ void NearBlocks::set(const Matrix3Xd& x) {
   flat_.set(about_, farthest);
   std::fill(boxed_.begin(), boxed_.end(), false);
   for (Box& box : box_) box.setEmpty();
+  for (Box& box : nodes_) box.setEmpty();
 }
 
 const NearBlocks::Box& NearBlocks::block_box(int block) {
@@ -59,6 +60,7 @@ std::vector<BlockPair> NearBlocks::meet(double reach) {
 }
 
 void NearBlocks::box_node(const Node& node) {
+  if (!box(node).isEmpty()) return;
   if (node.count() == 1) {
     box(node) = block_box(node.first);
     return;

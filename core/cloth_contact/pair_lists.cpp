@@ -65,7 +65,10 @@ void PairLists::look(const Matrix3Xd& x, const Came& came, double spare) {
             std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + 3 * spare, state,
             *lists_[k]);
     if (state.has_some && !(state.near_left >= comes + spare / 2))
-      prune(x, comes + std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest), state, *lists_[k]);
+      prune(x,
+            comes + (spare > 0 ? spare / 2
+                               : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
+            state, *lists_[k]);
     lasts_ = std::min(lasts_, state.has_some ? state.near_left : state.left);
     if (state.is_near) ++near_;
   }
@@ -110,7 +113,7 @@ double PairLists::left_at(const Matrix3Xd& x, const State& state, const List& li
   if (list.made_at.cols() == 0)
     return blocks_.distance(state.blocks, cloth_.thickest + enough) - cloth_.thickest;
   if (left < enough) left = std::max(left, list.reach - change(x, state.blocks, list));
-  if (state.has_some && left >= enough) nearer(list.all, x, 0, left);
+  if (state.has_some && left >= enough) nearer(list.all, x, 0, some_near_, left);
   return left;
 }
 
@@ -252,7 +255,7 @@ void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& sta
 
 void PairLists::prune(const Matrix3Xd& x, double reach, State& state, List& list) {
   state.near_left = state.left;
-  list.near = nearer(list.all, x, reach, state.near_left);
+  nearer(list.all, x, reach, list.near, state.near_left);
   state.is_near = !list.near.empty();
 }
 

@@ -96,6 +96,7 @@ class PairLists {
   std::size_t near_ = 0;       // lists that have some
   BlockMotion since_, in_window_;
   Matrix3Xd now_, now_all_;
+  Candidates some_near_;
 };
 
 }  // namespace weft

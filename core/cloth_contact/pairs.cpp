@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/cloth_contact/pair_batch.h"
@@ -87,23 +88,23 @@ Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs) {
   return made;
 }
 
-Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach,
-                  double& reach_of_others) {
-  Candidates near;
+void nearer(const Candidates& candidates, const Matrix3Xd& x, double reach, Candidates& near,
+            double& reach_of_others) {
+  double least = std::numeric_limits<double>::infinity();
   const auto particles = [](const Candidate& candidate) { return candidate.particle; };
   for (const bool edges : {false, true}) {
     std::vector<Candidate>& to = edges ? near.edges : near.corners;
+    to.clear();
     for_each_distance(edges, edges ? candidates.edges : candidates.corners, particles, x,
                       [&](const Candidate& candidate, double squared) {
                         const double within = candidate.thickness + reach;
                         if (squared < within * within)
                           to.push_back(candidate);
                         else
-                          reach_of_others =
-                              std::min(reach_of_others, std::sqrt(squared) - candidate.thickness);
+                          least = std::min(least, std::sqrt(squared) - candidate.thickness);
                       });
   }
-  return near;
+  reach_of_others = std::min(reach_of_others, least);
 }
 
 double thickness_of_corner(const Cloth& cloth, int particle, int triangle) {

@@ -29,10 +29,10 @@ struct Candidates {
 };
 
 Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs);
-// Those that are nearer to each other at x, (3 x particles) m, than their thickness and `reach`, m;
-// lowers `reach_of_others` to what keeps the others so, m.
-Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach,
-                  double& reach_of_others);
+// Leaves in `near` those that are nearer to each other at x, (3 x particles) m, than their thickness
+// and `reach`, m; lowers `reach_of_others` to what keeps the others so, m.
+void nearer(const Candidates& candidates, const Matrix3Xd& x, double reach, Candidates& near,
+            double& reach_of_others);
 
 // The distance at which cloth keeps these apart, m.
 double thickness_of_corner(const Cloth& cloth, int particle, int triangle);

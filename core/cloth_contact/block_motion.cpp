@@ -15,6 +15,7 @@ void BlockMotion::forget() {
   by_ = {};
 }
 
+// By what particles moved by.
 void BlockMotion::box_ways() {
   if (box_.empty()) {
     box_.resize(4 * static_cast<std::size_t>(blocks_.blocks()));

@@ -142,6 +142,10 @@ void FlatPatches::set(const Eigen::Matrix4Xf& places, double farthest) {
 }
 
 double FlatPatches::distance(const Blocks& some, const Blocks& others) {
+  const auto piece = [&](int block) { return cloth_.piece[static_cast<std::size_t>(block)]; };
+  const auto [first, last] = std::minmax(
+      {piece(some.first), piece(some.last - 1), piece(others.first), piece(others.last - 1)});
+  if (first != last) return 0;
   Patch& over = patch(some, others);
   if (!over.whole) return 0;
   if (over.asked_at != now_) {
@@ -210,7 +214,6 @@ FlatPatches::Patch& FlatPatches::patch(const Blocks& some, const Blocks& others)
   for (const Blocks& each : {some, others})
     for (auto b = static_cast<std::size_t>(each.first); b < static_cast<std::size_t>(each.last);
          ++b) {
-      if (cloth_.piece[b] != piece) return patch;
       corners.insert(corners.end(), hull_[b].begin(), hull_[b].end());
       box.extend(box_[b]);
     }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <cstddef>
 #include <unordered_map>
 #include <vector>
 
@@ -55,20 +56,21 @@ class FlatPatches {
     Vector2d from, to;
   };
 
+  struct Hash {
+    std::size_t operator()(const std::array<int, 4>& blocks) const;
+  };
+
   Patch& patch(const Blocks& some, const Blocks& others);
   double distance(const Patch& over);
   const Gradients& gradients(int block);
 
   const Cloth& cloth_;
-  std::vector<std::array<Eigen::Array4f, 2>> inverse_;  // of each triangle's sides in the flat
-                                                        // shape, as rows of a gradient, 1/m
-  std::vector<Polygon> hull_;             // of each block
-  std::vector<Box> box_;                  // around these
-  std::vector<double> least_height_;      // of each block, m
+  // of each triangle's sides in the flat shape, as rows of a gradient, 1/m
+  std::vector<std::array<Eigen::Array4f, 2>> inverse_;
+  std::vector<Polygon> hull_;         // of each block
+  std::vector<Box> box_;              // around these
+  std::vector<double> least_height_;  // of each block, m
   std::vector<Border> borders_;
-  struct Hash {
-    std::size_t operator()(const std::array<int, 4>& blocks) const;
-  };
   std::unordered_map<std::array<int, 4>, Patch, Hash> patches_;
 
   const Eigen::Matrix4Xf* places_ = nullptr;

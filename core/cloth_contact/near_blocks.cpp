@@ -32,8 +32,7 @@ void NearBlocks::set(const Matrix3Xd& x) {
   const double farthest = x.size() > 0 ? x.cwiseAbs().maxCoeff() : 0.0;
   x_ = &x;
   about_.resize(4, x.cols());
-  for (Eigen::Index i = 0; i < x.cols(); ++i)
-    about_.col(i) << x.col(i).cast<float>(), 0;
+  for (Eigen::Index i = 0; i < x.cols(); ++i) about_.col(i) << x.col(i).cast<float>(), 0;
   rounding_ = kOfTwo * farthest;
   flat_.set(about_, farthest);
   std::fill(boxed_.begin(), boxed_.end(), false);

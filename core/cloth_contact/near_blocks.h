@@ -82,8 +82,9 @@ class NearBlocks {
     if (one.count() + other.count() > kMost) return 0;
     return flat_.distance({one.first, one.last}, {other.first, other.last});
   }
-  // All of two blocks whose boxes are no farther apart than `reach`, m, and some that are, until it
-  // is called again: two triangles; two edges; a particle of the one and a triangle of the other.
+  // Of two blocks every two triangles, every two edges, or every particle of the one and triangle
+  // of the other, whose boxes are no farther apart than `reach`, m; rounding may add some. Until
+  // one of these is called again.
   std::span<const ClothPair> near_triangles(const BlockPair& blocks, double reach);
   std::span<const ClothPair> near_edges(const BlockPair& blocks, double reach);
   std::span<const ClothPair> near_corners(int one, int other, double reach);

@@ -65,10 +65,10 @@ void PairLists::look(const Matrix3Xd& x, const Came& came, double spare) {
             std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + 3 * spare, state,
             *lists_[k]);
     if (state.has_some && !(state.near_left >= comes + spare / 2))
-      prune(x,
-            comes + (spare > 0 ? spare / 2
-                               : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
-            state, *lists_[k]);
+      prune(
+          x,
+          comes + (spare > 0 ? spare / 2 : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
+          state, *lists_[k]);
     lasts_ = std::min(lasts_, state.has_some ? state.near_left : state.left);
     if (state.is_near) ++near_;
   }
@@ -122,8 +122,8 @@ template <class Came>
 void PairLists::meet(const Came& came, double spare) {
   constexpr double kApart = 1.5;  // of the thickest cloth, beside what it comes
   constexpr int kMostLooks = 64;  // until others may lie flat together
-  const bool all = before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_ ||
-                   ++looks_ == kMostLooks;
+  const bool all =
+      before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_ || ++looks_ == kMostLooks;
   if (all) looks_ = 0;
   std::vector<BlockPair> met;
   const auto is_far = [&](const NearBlocks::Node& one, const NearBlocks::Node& other, double gap) {

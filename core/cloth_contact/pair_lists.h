@@ -61,8 +61,8 @@ class PairLists {
     Matrix3Xd made_at = {};  // of the particles of both blocks, m; or empty
     Candidates all = {}, near = {};
   };
-  // Nodes of blocks that are so far apart, or lie so flat together, that no two of their blocks have
-  // a list.
+  // Nodes of blocks that are so far apart, or lie so flat together, that no two of their blocks
+  // have a list.
   struct Apart {
     NearBlocks::Node one, other;
     double left;  // until they may be near, m
@@ -89,11 +89,11 @@ class PairLists {
   Places before_about_;  // the same
   double lasts_ = -1;    // m
   std::vector<Apart> apart_, still_apart_;
-  std::size_t met_ = 0;        // of them and of states, when all were looked for
-  int looks_ = 0;              // since then
-  std::vector<State> states_;  // in ascending order of blocks
+  std::size_t met_ = 0;                       // of them and of states, when all were looked for
+  int looks_ = 0;                             // since then
+  std::vector<State> states_;                 // in ascending order of blocks
   std::vector<std::unique_ptr<List>> lists_;  // of these
-  std::size_t near_ = 0;       // lists that have some
+  std::size_t near_ = 0;                      // lists that have some
   BlockMotion since_, in_window_;
   Matrix3Xd now_, now_all_;
   Candidates some_near_;

@@ -29,8 +29,8 @@ struct Candidates {
 };
 
 Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs);
-// Leaves in `near` those that are nearer to each other at x, (3 x particles) m, than their thickness
-// and `reach`, m; lowers `reach_of_others` to what keeps the others so, m.
+// Leaves in `near` those that are nearer to each other at x, (3 x particles) m, than their
+// thickness and `reach`, m; lowers `reach_of_others` to what keeps the others so, m.
 void nearer(const Candidates& candidates, const Matrix3Xd& x, double reach, Candidates& near,
             double& reach_of_others);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 namespace weft {
@@ -11,11 +12,11 @@ BlockMotion::BlockMotion(const NearBlocks& blocks) : blocks_(blocks) {}
 void BlockMotion::forget() {
   box_ = {};
   joined_ = {};
+  by_ = {};
 }
 
-// by(i): what a particle moved by, m.
-template <class By>
-void BlockMotion::box(const By& by) {
+// By what particles moved by.
+void BlockMotion::box_ways() {
   if (box_.empty()) {
     box_.resize(4 * static_cast<std::size_t>(blocks_.blocks()));
     std::vector<NearBlocks::Node> nodes = {blocks_.root()};
@@ -32,7 +33,7 @@ void BlockMotion::box(const By& by) {
     Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity()),
                    high = -low;
     for (const int i : blocks_.particles(b)) {
-      const Eigen::Array4f moved = by(i);
+      const Eigen::Array4f moved = Eigen::Array4f::MapAligned(by_.data() + 4 * std::ptrdiff_t{i});
       low = low.min(moved);
       high = high.max(moved);
     }
@@ -47,21 +48,18 @@ void BlockMotion::box(const By& by) {
 
 void BlockMotion::set(const Matrix3Xd& from, const Matrix3Xd& to) {
   rounding_ = 1e-12;
-  box([&](int i) -> Eigen::Array4f {
-    const double *a = &from(0, i), *b = &to(0, i);
-    return {static_cast<float>(b[0] - a[0]), static_cast<float>(b[1] - a[1]),
-            static_cast<float>(b[2] - a[2]), 0};
-  });
+  by_.resize(4, to.cols());
+  for (Eigen::Index i = 0; i < to.cols(); ++i)
+    by_.col(i) << (to.col(i) - from.col(i)).cast<float>(), 0;
+  box_ways();
 }
 
 void BlockMotion::set(const Places& from, const Places& to) {
   constexpr double kEach = 4 * 0x1p-24;  // of two places and their difference
   const float farthest = std::max(from.cwiseAbs().maxCoeff(), to.cwiseAbs().maxCoeff());
   rounding_ = 4 * std::sqrt(3.0) * kEach * double{farthest};
-  const float *a = from.data(), *b = to.data();
-  box([a, b](int i) -> Eigen::Array4f {
-    return Eigen::Array4f::MapAligned(b + 4 * i) - Eigen::Array4f::MapAligned(a + 4 * i);
-  });
+  by_ = to - from;
+  box_ways();
 }
 
 }  // namespace weft

@@ -7,9 +7,6 @@
 
 namespace weft {
 
-// Of particles, rounded to single precision, m; fourth components are 0. (4 x particles)
-using Places = Eigen::Matrix4Xf;
-
 // What the particles of each block, and of each node of blocks, moved by from one place to another:
 // it lies in a box.
 class BlockMotion {
@@ -36,12 +33,12 @@ class BlockMotion {
   struct Box {
     Eigen::Array4f low, high;
   };
-  template <class By>
-  void box(const By& by);
+  void box_ways();
 
   const NearBlocks& blocks_;
   std::vector<int> joined_;  // nodes with halves, after these
   std::vector<Box> box_;     // of each node
+  Places by_;                // m
   double rounding_ = 0;      // m
 };
 

@@ -29,10 +29,10 @@ std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Mat
   };
   for (const BlockPair& blocks : near.meet(0)) {
     if (near.distance(blocks) > 0) continue;
-    near.for_each_near(blocks, 0, [&](int one, int other) {
+    for (const auto& [one, other] : near.near_triangles(blocks, 0)) {
       look(one, other);
       look(other, one);
-    });
+    }
   }
   return found;
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <tuple>
@@ -96,7 +98,11 @@ FlatPatches::FlatPatches(const Cloth& cloth) : cloth_(cloth) {
       const auto& flat = cloth.flat[at];
       Eigen::Matrix2d edges;
       edges << flat[1] - flat[0], flat[2] - flat[0];
-      inverse_.emplace_back(edges.inverse());
+      const Eigen::Matrix2f inverse = edges.inverse().cast<float>();
+      const auto row = [&](Eigen::Index k) -> Eigen::Array4f {
+        return {inverse(k, 0), inverse(k, 0), inverse(k, 1), inverse(k, 1)};
+      };
+      inverse_.push_back({row(0), row(1)});
       const double longest =
           std::max({edges.col(0).norm(), edges.col(1).norm(), (flat[2] - flat[1]).norm()});
       least = std::min(least, std::abs(edges.determinant()) / longest);
@@ -122,13 +128,24 @@ FlatPatches::FlatPatches(const Cloth& cloth) : cloth_(cloth) {
   known_.resize(blocks);
 }
 
-void FlatPatches::set(const Matrix3Xd& x) {
-  x_ = &x;
+std::size_t FlatPatches::Hash::operator()(const std::array<int, 4>& blocks) const {
+  std::uint64_t sum = 0;
+  for (const int b : blocks) sum = (sum ^ static_cast<std::uint64_t>(b)) * 0x9e3779b97f4a7c15;
+  return static_cast<std::size_t>(sum >> 32);
+}
+
+void FlatPatches::set(const Eigen::Matrix4Xf& places, double farthest) {
+  places_ = &places;
+  farthest_ = farthest;
   ++now_;
   std::fill(known_.begin(), known_.end(), false);
 }
 
 double FlatPatches::distance(const Blocks& some, const Blocks& others) {
+  const auto piece = [&](int block) { return cloth_.piece[static_cast<std::size_t>(block)]; };
+  const auto [first, last] = std::minmax(
+      {piece(some.first), piece(some.last - 1), piece(others.first), piece(others.last - 1)});
+  if (first != last) return 0;
   Patch& over = patch(some, others);
   if (!over.whole) return 0;
   if (over.asked_at != now_) {
@@ -143,34 +160,43 @@ double FlatPatches::distance(const Patch& over) {
   for (const int block : over.blocks) sum += gradients(block).sum;
   // seen along its mean normal
   const Gradient seen = axes_of(sum).leftCols<2>();
-  Eigen::Array4d low = Eigen::Array4d::Constant(std::numeric_limits<double>::infinity()),
+  Rows ways;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto axis = static_cast<Eigen::Index>(k);
+    const auto a = static_cast<float>(seen(axis, 0)), b = static_cast<float>(seen(axis, 1));
+    ways[k] = {a, b, a, b};
+  }
+  Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity()),
                  high = -low;
   constexpr std::size_t kFew = 8;  // blocks, of which each triangle is looked at
   for (const int block : over.blocks) {
     const Gradients& own = gradients(block);
     if (over.blocks.size() <= kFew) {
-      for (const Gradient& each : own.each) {
-        const Eigen::Matrix2d plane = seen.transpose() * each;
-        low = low.min(plane.reshaped().array());
-        high = high.max(plane.reshaped().array());
+      for (const Rows& each : own.each) {
+        const Eigen::Array4f plane = ways[0] * each[0] + ways[1] * each[1] + ways[2] * each[2];
+        low = low.min(plane);
+        high = high.max(plane);
       }
       continue;
     }
     const Gradient along = own.axes.transpose() * seen;
     const Eigen::Matrix2d middle = along.transpose() * own.middle,
                           half = along.cwiseAbs().transpose() * own.half;
-    low = low.min((middle - half).reshaped().array());
-    high = high.max((middle + half).reshaped().array());
+    low = low.min((middle - half).reshaped().array().cast<float>());
+    high = high.max((middle + half).reshaped().array().cast<float>());
   }
-  const Eigen::Array4d middle = (low + high) / 2;
-  const double differs = (high - low).matrix().norm() / 2;
+  const Eigen::Array4d middle = (low + high).cast<double>() / 2;
+  const double differs = (high - low).cast<double>().matrix().norm() / 2;
   Eigen::Matrix2d plane;
   plane << middle[0], middle[2], middle[1], middle[3];
   const Eigen::Matrix2d square = plane.transpose() * plane;
   const double least =
       square.trace() / 2 - std::hypot((square(0, 0) - square(1, 1)) / 2, square(0, 1));
-  constexpr double kRounding = 1e-6;
-  const double factor = std::sqrt(std::max(least, 0.0)) - differs - kRounding;
+  // of gradients, and of places
+  constexpr double kRounding = 32 * 0x1p-24;
+  const double most = 1 + double{low.abs().max(high.abs()).maxCoeff()};
+  const double rounding = kRounding * (most + farthest_ / over.least_height);
+  const double factor = std::sqrt(std::max(least, 0.0)) - differs - rounding;
   return factor > 0 ? factor * over.least_height : 0;
 }
 
@@ -188,7 +214,6 @@ FlatPatches::Patch& FlatPatches::patch(const Blocks& some, const Blocks& others)
   for (const Blocks& each : {some, others})
     for (auto b = static_cast<std::size_t>(each.first); b < static_cast<std::size_t>(each.last);
          ++b) {
-      if (cloth_.piece[b] != piece) return patch;
       corners.insert(corners.end(), hull_[b].begin(), hull_[b].end());
       box.extend(box_[b]);
     }
@@ -216,25 +241,56 @@ const FlatPatches::Gradients& FlatPatches::gradients(int block) {
   Gradients& gradients = gradients_[b];
   if (known_[b]) return gradients;
   known_[b] = true;
-  gradients.sum.setZero();
   gradients.each.clear();
+  const float* places = places_->data();
+  const auto place = [&](int i) -> Eigen::Array4f {
+    return Eigen::Array4f::MapAligned(places + 4 * std::ptrdiff_t{i});
+  };
+  Rows sum;
+  sum.fill(Eigen::Array4f::Zero());
   for (int t = cloth_.first_block[b]; t < cloth_.first_block[b + 1]; ++t) {
     const auto at = static_cast<std::size_t>(t);
     const auto& [i, j, k] = cloth_.triangles[at];
-    Gradient sides;
-    sides << x_->col(j) - x_->col(i), x_->col(k) - x_->col(i);
-    gradients.each.emplace_back(sides * inverse_[at]);
-    gradients.sum += gradients.each.back();
+    const Eigen::Array4f from = place(i), one = place(j) - from, other = place(k) - from;
+    Rows& rows = gradients.each.emplace_back();
+    for (std::size_t row = 0; row < 3; ++row) {
+      const auto axis = static_cast<Eigen::Index>(row);
+      rows[row] = one[axis] * inverse_[at][0] + other[axis] * inverse_[at][1];
+      sum[row] += rows[row];
+    }
+  }
+  for (std::size_t row = 0; row < 3; ++row) {
+    const auto axis = static_cast<Eigen::Index>(row);
+    gradients.sum(axis, 0) = double{sum[row][0]};
+    gradients.sum(axis, 1) = double{sum[row][2]};
   }
   gradients.axes = axes_of(gradients.sum);
-  Gradient low = Gradient::Constant(std::numeric_limits<double>::infinity()), high = -low;
-  for (const Gradient& each : gradients.each) {
-    const Gradient along = gradients.axes.transpose() * each;
-    low = low.cwiseMin(along);
-    high = high.cwiseMax(along);
+  // along the first two axes, and the third
+  Rows ways, out;
+  for (std::size_t row = 0; row < 3; ++row) {
+    const Eigen::Array3f along =
+        gradients.axes.row(static_cast<Eigen::Index>(row)).transpose().array().cast<float>();
+    ways[row] = {along[0], along[1], along[0], along[1]};
+    out[row] = Eigen::Array4f::Constant(along[2]);
   }
-  gradients.middle = (low + high) / 2;
-  gradients.half = (high - low) / 2;
+  Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity()),
+                 high = -low, low_out = low, high_out = high;
+  for (const Rows& each : gradients.each) {
+    const Eigen::Array4f in = ways[0] * each[0] + ways[1] * each[1] + ways[2] * each[2],
+                         beside = out[0] * each[0] + out[1] * each[1] + out[2] * each[2];
+    low = low.min(in);
+    high = high.max(in);
+    low_out = low_out.min(beside);
+    high_out = high_out.max(beside);
+  }
+  const auto gradient = [](const Eigen::Array4f& in, const Eigen::Array4f& beside) {
+    Gradient made;
+    made << double{in[0]}, double{in[2]}, double{in[1]}, double{in[3]}, double{beside[0]},
+        double{beside[2]};
+    return made;
+  };
+  gradients.middle = gradient((low + high) / 2, (low_out + high_out) / 2);
+  gradients.half = gradient((high - low) / 2, (high_out - low_out) / 2);
   return gradients;
 }
 

@@ -2,7 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <array>
-#include <map>
+#include <cstddef>
+#include <unordered_map>
 #include <vector>
 
 #include "core/cloth_contact/cloth.h"
@@ -19,8 +20,9 @@ class FlatPatches {
  public:
   explicit FlatPatches(const Cloth& cloth);
 
-  // From now on cloth is at x, (3 x particles) m, which outlives what is asked.
-  void set(const Matrix3Xd& x);
+  // From now on cloth is at `places`, (4 x particles) m in single precision, no coordinate beyond
+  // `farthest`, which outlive what is asked.
+  void set(const Eigen::Matrix4Xf& places, double farthest);
   // Blocks first ... last - 1.
   struct Blocks {
     int first, last;
@@ -31,9 +33,11 @@ class FlatPatches {
 
  private:
   using Gradient = Eigen::Matrix<double, 3, 2>;
+  // Rows of a gradient (u, v): (u, u, v, v), in single precision.
+  using Rows = std::array<Eigen::Array4f, 3>;
   // Of the triangles of a block: they lie in a box along axes that lie in the block.
   struct Gradients {
-    std::vector<Gradient> each;
+    std::vector<Rows> each;
     Gradient sum;
     Eigen::Matrix3d axes;
     Gradient middle, half;  // along these
@@ -52,19 +56,25 @@ class FlatPatches {
     Vector2d from, to;
   };
 
+  struct Hash {
+    std::size_t operator()(const std::array<int, 4>& blocks) const;
+  };
+
   Patch& patch(const Blocks& some, const Blocks& others);
   double distance(const Patch& over);
   const Gradients& gradients(int block);
 
   const Cloth& cloth_;
-  std::vector<Eigen::Matrix2d> inverse_;  // of each triangle's sides in the flat shape, 1/m
-  std::vector<Polygon> hull_;             // of each block
-  std::vector<Box> box_;                  // around these
-  std::vector<double> least_height_;      // of each block, m
+  // of each triangle's sides in the flat shape, as rows of a gradient, 1/m
+  std::vector<std::array<Eigen::Array4f, 2>> inverse_;
+  std::vector<Polygon> hull_;         // of each block
+  std::vector<Box> box_;              // around these
+  std::vector<double> least_height_;  // of each block, m
   std::vector<Border> borders_;
-  std::map<std::array<int, 4>, Patch> patches_;
+  std::unordered_map<std::array<int, 4>, Patch, Hash> patches_;
 
-  const Matrix3Xd* x_ = nullptr;
+  const Eigen::Matrix4Xf* places_ = nullptr;
+  double farthest_ = 0;               // m
   int now_ = 0;                       // counts what was set
   std::vector<Gradients> gradients_;  // of each block
   std::vector<bool> known_;           // which of them are of x

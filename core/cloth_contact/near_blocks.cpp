@@ -8,8 +8,9 @@ NearBlocks::NearBlocks(const Cloth& cloth)
     : cloth_(cloth),
       flat_(cloth),
       box_(cloth.first_block.size() - 1),
+      boxed_(box_.size()),
       triangle_box_(cloth.triangles.size()),
-      boxed_(box_.size()) {
+      edge_box_(cloth.edges.size()) {
   nodes_.resize(4 * box_.size());
   number_.resize(box_.size());
   number_node(root());
@@ -27,10 +28,16 @@ NearBlocks::NearBlocks(const Cloth& cloth)
 }
 
 void NearBlocks::set(const Matrix3Xd& x) {
+  constexpr double kOfTwo = 8 * 0x1p-24;  // places, of their difference and of the reach
+  const double farthest = x.size() > 0 ? x.cwiseAbs().maxCoeff() : 0.0;
   x_ = &x;
-  flat_.set(x);
+  about_.resize(4, x.cols());
+  for (Eigen::Index i = 0; i < x.cols(); ++i) about_.col(i) << x.col(i).cast<float>(), 0;
+  rounding_ = kOfTwo * farthest;
+  flat_.set(about_, farthest);
   std::fill(boxed_.begin(), boxed_.end(), false);
   for (Box& box : box_) box.setEmpty();
+  for (Box& box : nodes_) box.setEmpty();
 }
 
 const NearBlocks::Box& NearBlocks::block_box(int block) {
@@ -52,6 +59,7 @@ std::vector<BlockPair> NearBlocks::meet(double reach) {
 }
 
 void NearBlocks::box_node(const Node& node) {
+  if (!box(node).isEmpty()) return;
   if (node.count() == 1) {
     box(node) = block_box(node.first);
     return;
@@ -84,24 +92,114 @@ double NearBlocks::distance(const BlockPair& blocks, double enough) {
              : std::max(together, flat_.distance({one, one + 1}, {other, other + 1}));
 }
 
-void NearBlocks::box_triangles(std::size_t block) {
-  if (boxed_[block]) return;
-  boxed_[block] = true;
-  for (int t = cloth_.first_block[block]; t < cloth_.first_block[block + 1]; ++t) {
-    Box& box = triangle_box_[static_cast<std::size_t>(t)];
-    box.setEmpty();
-    for (const int i : cloth_.triangles[static_cast<std::size_t>(t)]) box.extend(x_->col(i));
+void NearBlocks::box_parts(int block) {
+  const auto b = static_cast<std::size_t>(block);
+  if (boxed_[b]) return;
+  boxed_[b] = true;
+  const auto first = static_cast<std::size_t>(cloth_.first_block[b]),
+             last = static_cast<std::size_t>(cloth_.first_block[b + 1]);
+  for (std::size_t t = first; t < last; ++t) {
+    const auto& [i, j, k] = cloth_.triangles[t];
+    const Eigen::Array4f p = place(i), q = place(j), r = place(k);
+    triangle_box_[t] = {p.min(q).min(r), p.max(q).max(r)};
+  }
+  for (int e = cloth_.first_edge[first]; e < cloth_.first_edge[last]; ++e) {
+    const auto& [i, j] = cloth_.edges[static_cast<std::size_t>(e)];
+    const Eigen::Array4f p = place(i), q = place(j);
+    edge_box_[static_cast<std::size_t>(e)] = {p.min(q), p.max(q)};
   }
 }
 
-// Those of a block near another one.
-void NearBlocks::choose(int block, int near, double reach, std::vector<int>& triangles) {
+// Of first ... last - 1 those near a block.
+template <class BoxOf>
+void NearBlocks::choose(int first, int last, const BoxOf& box_of, int near, double reach,
+                        SmallBoxes& chosen) {
+  const Box& box = block_box(near);
+  SmallBox there = {Eigen::Array4f::Zero(), Eigen::Array4f::Zero()};
+  there.low.head<3>() = box.min().array().cast<float>();
+  there.high.head<3>() = box.max().array().cast<float>();
+  const auto most = static_cast<float>(reach + rounding_);
+  const auto count = static_cast<std::size_t>(last - first);
+  chosen.number.resize(count);
+  chosen.box.resize(count);
+  std::size_t n = 0;
+  for (int k = first; k < last; ++k) {
+    const SmallBox& own = box_of(k);
+    chosen.number[n] = k;
+    chosen.box[n] = own;
+    n += (there.low - own.high).max(own.low - there.high).maxCoeff() <= most ? 1 : 0;
+  }
+  chosen.number.resize(n);
+  chosen.box.resize(n);
+}
+
+void NearBlocks::choose_triangles(int block, int near, double reach, SmallBoxes& chosen) {
   const auto b = static_cast<std::size_t>(block);
-  box_triangles(b);
-  const Box& there = block_box(near);
-  triangles.clear();
-  for (int t = cloth_.first_block[b]; t < cloth_.first_block[b + 1]; ++t)
-    if (gap(triangle_box(t), there) <= reach) triangles.push_back(t);
+  box_parts(block);
+  choose(
+      cloth_.first_block[b], cloth_.first_block[b + 1],
+      [&](int t) -> const SmallBox& { return triangle_box_[static_cast<std::size_t>(t)]; }, near,
+      reach, chosen);
+}
+
+void NearBlocks::choose_edges(int block, int near, double reach, SmallBoxes& chosen) {
+  const auto b = static_cast<std::size_t>(block);
+  box_parts(block);
+  choose(
+      cloth_.first_edge[static_cast<std::size_t>(cloth_.first_block[b])],
+      cloth_.first_edge[static_cast<std::size_t>(cloth_.first_block[b + 1])],
+      [&](int e) -> const SmallBox& { return edge_box_[static_cast<std::size_t>(e)]; }, near, reach,
+      chosen);
+}
+
+void NearBlocks::choose_corners(int block, int near, double reach, SmallBoxes& chosen) {
+  const auto b = static_cast<std::size_t>(block);
+  const auto particle = [&](int k) { return cloth_.corners[static_cast<std::size_t>(k)]; };
+  choose(
+      cloth_.first_corner[static_cast<std::size_t>(cloth_.first_block[b])],
+      cloth_.first_corner[static_cast<std::size_t>(cloth_.first_block[b + 1])],
+      [&](int k) -> SmallBox {
+        const Eigen::Array4f at = place(particle(k));
+        return {at, at};
+      },
+      near, reach, chosen);
+  for (int& k : chosen.number) k = particle(k);
+}
+
+// Of those chosen and others all that are near each other.
+std::span<const ClothPair> NearBlocks::meet_chosen(double reach, bool ascending) {
+  const auto most = static_cast<float>(reach + rounding_);
+  const std::size_t count = chosen_.box.size() * others_.box.size();
+  if (met_.size() < count) met_.resize(count);
+  std::size_t n = 0;
+  for (std::size_t k = 0; k < chosen_.box.size(); ++k) {
+    const SmallBox own = chosen_.box[k];
+    const int number = chosen_.number[k];
+    for (std::size_t l = ascending ? k + 1 : 0; l < others_.box.size(); ++l) {
+      const SmallBox& there = others_.box[l];
+      met_[n] = {number, others_.number[l]};
+      n += (there.low - own.high).max(own.low - there.high).maxCoeff() <= most ? 1 : 0;
+    }
+  }
+  return std::span(met_).first(n);
+}
+
+std::span<const ClothPair> NearBlocks::near_triangles(const BlockPair& blocks, double reach) {
+  choose_triangles(blocks.one, blocks.other, reach, chosen_);
+  choose_triangles(blocks.other, blocks.one, reach, others_);
+  return meet_chosen(reach, blocks.one == blocks.other);
+}
+
+std::span<const ClothPair> NearBlocks::near_edges(const BlockPair& blocks, double reach) {
+  choose_edges(blocks.one, blocks.other, reach, chosen_);
+  choose_edges(blocks.other, blocks.one, reach, others_);
+  return meet_chosen(reach, blocks.one == blocks.other);
+}
+
+std::span<const ClothPair> NearBlocks::near_corners(int one, int other, double reach) {
+  choose_corners(one, other, reach, chosen_);
+  choose_triangles(other, one, reach, others_);
+  return meet_chosen(reach, false);
 }
 
 }  // namespace weft

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <compare>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -9,10 +11,19 @@
 
 namespace weft {
 
+// Of particles, rounded to single precision, m; fourth components are 0. (4 x particles)
+using Places = Eigen::Matrix4Xf;
+
 // Two blocks of a cloth's triangles, one <= other.
 struct BlockPair {
   int one = 0, other = 0;
   auto operator<=>(const BlockPair&) const = default;
+};
+
+// Numbers of a particle and a triangle, or of two edges, or of two triangles.
+struct ClothPair {
+  int first = 0, second = 0;
+  auto operator<=>(const ClothPair&) const = default;
 };
 
 // Finds what is near by boxes around blocks of triangles, and around blocks of blocks.
@@ -37,12 +48,13 @@ class NearBlocks {
   int number(int block) const { return number_[static_cast<std::size_t>(block)]; }
   // From now on cloth is at x, (3 x particles) m, which outlives what is asked.
   void set(const Matrix3Xd& x);
+  const Places& places() const { return about_; }
   // Two blocks, or a block and itself, whose boxes are no farther apart than `reach`, m, along any
   // axis; in ascending order.
   std::vector<BlockPair> meet(double reach);
   // Shares out every two blocks of two nodes, or of one and every block with itself: calls
-  // is_far(one, other, gap of their boxes, m) for nodes, and where that is false for their halves;
-  // near(blocks) for what is left.
+  // is_far(one, other, gap of their boxes, m) for nodes, or for one and itself, and where that is
+  // false for their halves; near(blocks) for what is left.
   template <class IsFar, class Near>
   void share_out(const Node& one, const Node& other, const IsFar& is_far, const Near& near) {
     box_node(one);
@@ -50,26 +62,32 @@ class NearBlocks {
     one.number == other.number ? share_out_within(one, is_far, near)
                                : share_out_between(one, other, is_far, near);
   }
+  // Of the boxes of two blocks, m.
+  double gap(const BlockPair& blocks) {
+    return std::max(gap(block_box(blocks.one), block_box(blocks.other)), 0.0);
+  }
   // The least distance between what shares no particle in two blocks, at least, m; 0 where that
   // takes a closer look. The closest is not looked for where it is `enough`.
   double distance(const BlockPair& blocks, double enough = 0);
-  // That between the boxes of nodes, along the axis on which they are farthest apart, m.
-  double distance(const Node& one, const Node& other) {
+  // The same of all blocks of two nodes, or of one, m.
+  double distance(const Node& one, const Node& other, double enough) {
     box_node(one);
     box_node(other);
-    return gap(box(one), box(other));
+    const double between = gap(box(one), box(other));
+    return between >= enough ? between : std::max(between, distance_if_flat(one, other));
   }
-  // Calls f(one, other) for every two triangles of two blocks whose boxes are no farther apart than
-  // `reach`, m.
-  template <class F>
-  void for_each_near(const BlockPair& blocks, double reach, const F& f) {
-    choose(blocks.one, blocks.other, reach, near_one_);
-    choose(blocks.other, blocks.one, reach, near_other_);
-    for (const int s : near_one_)
-      for (const int t : near_other_)
-        if ((blocks.one != blocks.other || s < t) && gap(triangle_box(s), triangle_box(t)) <= reach)
-          f(s, t);
+  // 0 where they do not lie flat together, m.
+  double distance_if_flat(const Node& one, const Node& other) {
+    constexpr int kMost = 64;  // blocks
+    if (one.count() + other.count() > kMost) return 0;
+    return flat_.distance({one.first, one.last}, {other.first, other.last});
   }
+  // Of two blocks every two triangles, every two edges, or every particle of the one and triangle
+  // of the other, whose boxes are no farther apart than `reach`, m; rounding may add some. Until
+  // one of these is called again.
+  std::span<const ClothPair> near_triangles(const BlockPair& blocks, double reach);
+  std::span<const ClothPair> near_edges(const BlockPair& blocks, double reach);
+  std::span<const ClothPair> near_corners(int one, int other, double reach);
   // Of a block.
   std::span<const int> particles(int block) const {
     const auto b = static_cast<std::size_t>(block);
@@ -83,16 +101,25 @@ class NearBlocks {
   static double gap(const Box& one, const Box& other) {
     return (one.min() - other.max()).cwiseMax(other.min() - one.max()).maxCoeff();
   }
+  // Rounded to single precision; fourth components are 0.
+  struct SmallBox {
+    Eigen::Array4f low, high;
+  };
+  struct SmallBoxes {
+    std::vector<int> number;  // of what is in each
+    std::vector<SmallBox> box;
+  };
   const Box& block_box(int block);
   Box& box(const Node& node) { return nodes_[static_cast<std::size_t>(node.number)]; }
-  const Box& triangle_box(int triangle) const {
-    return triangle_box_[static_cast<std::size_t>(triangle)];
-  }
   void box_node(const Node& node);
-  void box_triangles(std::size_t block);
+  void box_parts(int block);
+  Eigen::Array4f place(int particle) const {
+    return Eigen::Array4f::MapAligned(about_.data() + 4 * std::ptrdiff_t{particle});
+  }
   template <class IsFar, class Near>
   void share_out_within(const Node& node, const IsFar& is_far, const Near& near) {
     if (node.count() == 1) return near(BlockPair{node.first, node.first});
+    if (is_far(node, node, gap(box(node), box(node)))) return;
     share_out_within(node.half(0), is_far, near);
     share_out_within(node.half(1), is_far, near);
     share_out_between(node.half(0), node.half(1), is_far, near);
@@ -108,18 +135,27 @@ class NearBlocks {
                         is_far, near);
   }
   void number_node(const Node& node);
-  void choose(int block, int near, double reach, std::vector<int>& triangles);
+  template <class BoxOf>
+  void choose(int first, int last, const BoxOf& box_of, int near, double reach, SmallBoxes& chosen);
+  void choose_triangles(int block, int near, double reach, SmallBoxes& chosen);
+  void choose_edges(int block, int near, double reach, SmallBoxes& chosen);
+  void choose_corners(int block, int near, double reach, SmallBoxes& chosen);
+  std::span<const ClothPair> meet_chosen(double reach, bool ascending);
 
   const Cloth& cloth_;
   FlatPatches flat_;
   std::vector<int> first_particle_, particles_;  // of each block
-  std::vector<Box> nodes_, box_, triangle_box_;  // empty where not known
-  std::vector<bool> boxed_;                      // of each block: its triangles
+  std::vector<Box> nodes_, box_;                 // empty where not known
+  std::vector<bool> boxed_;                      // of each block: its parts
   std::vector<int> number_;                      // of each block
   std::vector<FlatPatches::Blocks> around_;      // each: some that may be flat together
 
   const Matrix3Xd* x_ = nullptr;
-  std::vector<int> near_one_, near_other_;
+  Places about_;         // the same
+  double rounding_ = 0;  // of the gap between small boxes, m
+  std::vector<SmallBox> triangle_box_, edge_box_;
+  SmallBoxes chosen_, others_;
+  std::vector<ClothPair> met_;
 };
 
 }  // namespace weft

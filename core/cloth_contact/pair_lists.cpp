@@ -14,7 +14,7 @@ void PairLists::forget() {
   before_ = {};
   before_about_ = {};
   states_ = {};
-  lists_ = {};
+  lists_ = decltype(lists_)();
   apart_ = still_apart_ = {};
   since_.forget();
   in_window_.forget();
@@ -51,9 +51,7 @@ void PairLists::look(const Matrix3Xd& x, const Came& came, double spare) {
   }
   meet(came, spare);
   before_ = x;
-  before_about_.resize(4, x.cols());
-  before_about_.topRows<3>() = x.cast<float>();
-  before_about_.row(3).setZero();
+  before_about_ = blocks_.places();
 
   lasts_ = kMostMotion * thickest;
   near_ = 0;
@@ -63,11 +61,14 @@ void PairLists::look(const Matrix3Xd& x, const Came& came, double spare) {
     // shares no particle there is 2.8 thicknesses apart
     const double comes = state.came = came(number(state.blocks.one), number(state.blocks.other));
     if (!(state.left >= comes + spare))
-      renew(x, comes + std::min(2 * comes, 0.5 * thickest) + 0.1 * thickest,
+      renew(x, least_left(comes),
             std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + 3 * spare, state,
-            lists_[k]);
+            *lists_[k]);
     if (state.has_some && !(state.near_left >= comes + spare / 2))
-      prune(x, comes + std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest), state, lists_[k]);
+      prune(
+          x,
+          comes + (spare > 0 ? spare / 2 : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
+          state, *lists_[k]);
     lasts_ = std::min(lasts_, state.has_some ? state.near_left : state.left);
     if (state.is_near) ++near_;
   }
@@ -92,14 +93,15 @@ void PairLists::look(const Places& now, double come) {
     const double by = since_.between(number(state.blocks.one), number(state.blocks.other));
     double left = (state.has_some ? state.near_left : state.left) - by;
     if (left < come && look_closer())
-      left = left_at(now_all_, state, lists_[k], state.left - by, come + rounding) - rounding;
+      left = left_at(now_all_, state, *lists_[k], state.left - by, come + rounding) - rounding;
     lasts_ = std::min(lasts_, left);
   }
   for (std::size_t k = 0; k < apart_.size() && lasts_ >= come; ++k) {
     const auto& [one, other, left_then] = apart_[k];
     double left = left_then - since_.between(one.number, other.number);
     if (left < come && look_closer())
-      left = blocks_.distance(one, other) - cloth_.thickest - rounding;
+      left = blocks_.distance(one, other, cloth_.thickest + come + rounding) - cloth_.thickest -
+             rounding;
     lasts_ = std::min(lasts_, left);
   }
 }
@@ -111,7 +113,7 @@ double PairLists::left_at(const Matrix3Xd& x, const State& state, const List& li
   if (list.made_at.cols() == 0)
     return blocks_.distance(state.blocks, cloth_.thickest + enough) - cloth_.thickest;
   if (left < enough) left = std::max(left, list.reach - change(x, state.blocks, list));
-  if (state.has_some && left >= enough) nearer(list.all, x, 0, left);
+  if (state.has_some && left >= enough) nearer(list.all, x, 0, some_near_, left);
   return left;
 }
 
@@ -119,11 +121,19 @@ double PairLists::left_at(const Matrix3Xd& x, const State& state, const List& li
 template <class Came>
 void PairLists::meet(const Came& came, double spare) {
   constexpr double kApart = 1.5;  // of the thickest cloth, beside what it comes
-  const bool all = before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_;
+  constexpr int kMostLooks = 64;  // until others may lie flat together
+  const bool all =
+      before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_ || ++looks_ == kMostLooks;
+  if (all) looks_ = 0;
   std::vector<BlockPair> met;
   const auto is_far = [&](const NearBlocks::Node& one, const NearBlocks::Node& other, double gap) {
-    const double left = gap - cloth_.thickest;
-    if (left < came(one.number, other.number) + kApart * cloth_.thickest) return false;
+    const double comes = came(one.number, other.number);
+    double left = gap - cloth_.thickest;
+    if (left < comes + kApart * cloth_.thickest) {
+      if (one.count() + other.count() == 2) return false;
+      left = blocks_.distance_if_flat(one, other) - cloth_.thickest;
+      if (left < least_left(comes) + spare) return false;
+    }
     still_apart_.push_back({one, other, left});
     return true;
   };
@@ -142,6 +152,11 @@ void PairLists::meet(const Came& came, double spare) {
   std::sort(met.begin(), met.end());
   if (all || !met.empty()) add(met, all);
   if (all) met_ = apart_.size() + states_.size();
+}
+
+// Of what is looked at anew, where particles come so far in a window, m.
+double PairLists::least_left(double come) const {
+  return come + std::min(2 * come, 0.5 * cloth_.thickest) + 0.1 * cloth_.thickest;
 }
 
 double PairLists::length(double came) const {
@@ -192,7 +207,9 @@ double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List
 // Adds blocks that have met, in their order; of the lists before it keeps all, or only theirs.
 void PairLists::add(const std::vector<BlockPair>& met, bool only) {
   const std::vector<State> old_states = std::exchange(states_, {});
-  std::vector<List> old_lists = std::exchange(lists_, {});
+  std::vector<std::unique_ptr<List>> old_lists = std::exchange(lists_, {});
+  states_.reserve(old_states.size() + met.size());
+  lists_.reserve(old_states.size() + met.size());
   std::size_t known = 0;
   const auto keep = [&] {
     states_.push_back(old_states[known]);
@@ -206,7 +223,7 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
       ++known;
     } else {
       states_.push_back({blocks});
-      lists_.emplace_back();
+      lists_.push_back(std::make_unique<List>());
     }
   }
   if (only) return;
@@ -216,10 +233,19 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
 void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& state, List& list) {
   if (list.made_at.cols() > 0) state.left = list.reach - change(x, state.blocks, list);
   if (state.left >= least) return;
+  constexpr int kMostBent = 7;
   list = {};
   state.has_some = state.is_near = false;
   state.near_left = -1;
-  state.left = blocks_.distance(state.blocks, cloth_.thickest + least) - cloth_.thickest;
+  // what is bent stays so for a while
+  if (state.bent > 0) {
+    --state.bent;
+    state.left = blocks_.gap(state.blocks) - cloth_.thickest;
+  } else {
+    state.left = blocks_.distance(state.blocks, cloth_.thickest + least) - cloth_.thickest;
+    state.bent_for = state.left >= least ? 0 : std::min(2 * state.bent_for + 1, kMostBent);
+    state.bent = state.bent_for;
+  }
   if (state.left >= least) return;
   state.left = list.reach = reach;
   place(x, state.blocks, list.made_at);
@@ -229,7 +255,7 @@ void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& sta
 
 void PairLists::prune(const Matrix3Xd& x, double reach, State& state, List& list) {
   state.near_left = state.left;
-  list.near = nearer(list.all, x, reach, state.near_left);
+  nearer(list.all, x, reach, list.near, state.near_left);
   state.is_near = !list.near.empty();
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/cloth_contact/block_motion.h"
@@ -43,7 +44,7 @@ class PairLists {
   template <class F>
   void for_each_list(const F& f) const {
     for (std::size_t k = 0; k < states_.size(); ++k)
-      if (states_[k].is_near) f(states_[k].blocks, lists_[k].near, states_[k].came);
+      if (states_[k].is_near) f(states_[k].blocks, lists_[k]->near, states_[k].came);
   }
 
  private:
@@ -53,13 +54,15 @@ class PairLists {
     double left = -1, near_left = -1;  // of the reach of all, and of what is near, m
     double came = 0;                   // in the window, m
     bool has_some = false, is_near = false;
+    int bent = 0, bent_for = 0;  // how often it is not asked whether they lie flat
   };
   struct List {
     double reach = 0;        // when it was made, m
     Matrix3Xd made_at = {};  // of the particles of both blocks, m; or empty
     Candidates all = {}, near = {};
   };
-  // Nodes of blocks that are so far apart that no two of their blocks have a list.
+  // Nodes of blocks that are so far apart, or lie so flat together, that no two of their blocks
+  // have a list.
   struct Apart {
     NearBlocks::Node one, other;
     double left;  // until they may be near, m
@@ -70,6 +73,7 @@ class PairLists {
   template <class Came>
   void meet(const Came& came, double spare);
   void add(const std::vector<BlockPair>& met, bool only);
+  double least_left(double come) const;
   double length(double came) const;  // no more than kMostMotion
   int number(int block) const { return blocks_.number(block); }
   void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
@@ -85,12 +89,14 @@ class PairLists {
   Places before_about_;  // the same
   double lasts_ = -1;    // m
   std::vector<Apart> apart_, still_apart_;
-  std::size_t met_ = 0;        // of them and of states, when all were looked for
-  std::vector<State> states_;  // in ascending order of blocks
-  std::vector<List> lists_;    // of these
-  std::size_t near_ = 0;       // lists that have some
+  std::size_t met_ = 0;                       // of them and of states, when all were looked for
+  int looks_ = 0;                             // since then
+  std::vector<State> states_;                 // in ascending order of blocks
+  std::vector<std::unique_ptr<List>> lists_;  // of these
+  std::size_t near_ = 0;                      // lists that have some
   BlockMotion since_, in_window_;
   Matrix3Xd now_, now_all_;
+  Candidates some_near_;
 };
 
 }  // namespace weft

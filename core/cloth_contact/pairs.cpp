@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/cloth_contact/pair_batch.h"
@@ -87,23 +88,23 @@ Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs) {
   return made;
 }
 
-Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach,
-                  double& reach_of_others) {
-  Candidates near;
+void nearer(const Candidates& candidates, const Matrix3Xd& x, double reach, Candidates& near,
+            double& reach_of_others) {
+  double least = std::numeric_limits<double>::infinity();
   const auto particles = [](const Candidate& candidate) { return candidate.particle; };
   for (const bool edges : {false, true}) {
     std::vector<Candidate>& to = edges ? near.edges : near.corners;
+    to.clear();
     for_each_distance(edges, edges ? candidates.edges : candidates.corners, particles, x,
                       [&](const Candidate& candidate, double squared) {
                         const double within = candidate.thickness + reach;
                         if (squared < within * within)
                           to.push_back(candidate);
                         else
-                          reach_of_others =
-                              std::min(reach_of_others, std::sqrt(squared) - candidate.thickness);
+                          least = std::min(least, std::sqrt(squared) - candidate.thickness);
                       });
   }
-  return near;
+  reach_of_others = std::min(reach_of_others, least);
 }
 
 double thickness_of_corner(const Cloth& cloth, int particle, int triangle) {
@@ -170,25 +171,16 @@ std::map<BlockPair, ClothPairs> all_pairs(const Cloth& cloth) {
 ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
                       const Matrix3Xd& x, double reach) {
   ClothPairs some, found;
-  const auto corners = [&](int from, int triangle) {
-    const auto f = static_cast<std::size_t>(from);
-    for (int k = cloth.first_corner[f]; k < cloth.first_corner[f + 1]; ++k) {
-      const int i = cloth.corners[static_cast<std::size_t>(k)];
-      if (!has(corners_of(cloth, triangle), i)) some.corners.push_back({i, triangle});
-    }
+  const double boxes_within = cloth.thickest + reach;
+  const auto add_corners = [&](int one, int other) {
+    for (const ClothPair& pair : near.near_corners(one, other, boxes_within))
+      if (!has(corners_of(cloth, pair.second), pair.first)) some.corners.push_back(pair);
   };
-  const auto edges = [&](int one, int other) {
-    const auto s = static_cast<std::size_t>(one), t = static_cast<std::size_t>(other);
-    for (int e = cloth.first_edge[s]; e < cloth.first_edge[s + 1]; ++e)
-      for (int f = cloth.first_edge[t]; f < cloth.first_edge[t + 1]; ++f)
-        if (!share_end(ends_of(cloth, e), ends_of(cloth, f)))
-          some.edges.push_back({std::min(e, f), std::max(e, f)});
-  };
-  near.for_each_near(blocks, cloth.thickest + reach, [&](int one, int other) {
-    corners(one, other);
-    corners(other, one);
-    edges(one, other);
-  });
+  add_corners(blocks.one, blocks.other);
+  if (blocks.one != blocks.other) add_corners(blocks.other, blocks.one);
+  for (const ClothPair& pair : near.near_edges(blocks, boxes_within))
+    if (!share_end(ends_of(cloth, pair.first), ends_of(cloth, pair.second)))
+      some.edges.push_back(pair);
   for_each_distance(
       false, some.corners, [&](const ClothPair& pair) { return particles_of_corner(cloth, pair); },
       x,

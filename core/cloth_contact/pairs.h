@@ -1,19 +1,12 @@
 #pragma once
 
 #include <array>
-#include <compare>
 #include <map>
 #include <vector>
 
 #include "core/cloth_contact/near_blocks.h"
 
 namespace weft {
-
-// Numbers of a particle and a triangle, or of two edges.
-struct ClothPair {
-  int first = 0, second = 0;
-  auto operator<=>(const ClothPair&) const = default;
-};
 
 // Pairs of cloth that share no particle, in ascending order.
 struct ClothPairs {
@@ -36,10 +29,10 @@ struct Candidates {
 };
 
 Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs);
-// Those that are nearer to each other at x, (3 x particles) m, than their thickness and `reach`, m;
-// lowers `reach_of_others` to what keeps the others so, m.
-Candidates nearer(const Candidates& candidates, const Matrix3Xd& x, double reach,
-                  double& reach_of_others);
+// Leaves in `near` those that are nearer to each other at x, (3 x particles) m, than their
+// thickness and `reach`, m; lowers `reach_of_others` to what keeps the others so, m.
+void nearer(const Candidates& candidates, const Matrix3Xd& x, double reach, Candidates& near,
+            double& reach_of_others);
 
 // The distance at which cloth keeps these apart, m.
 double thickness_of_corner(const Cloth& cloth, int particle, int triangle);

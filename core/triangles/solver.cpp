@@ -214,12 +214,10 @@ class TriangleSolver : public SheetSolver {
   }
 
   Vector3d exact(const AlignedArray<T>& plane, const AlignedArray<T>& error, std::size_t at) const {
-    Vector3d v;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      double& value = v[static_cast<Eigen::Index>(axis)] = double{plane.data()[at + axis]};
-      if (law_.compensated) value -= double{error.data()[at + axis]};
-    }
-    return v;
+    using Four = Eigen::Array<T, 4, 1>;
+    Eigen::Array4d v = Four::Map(plane.data() + at).template cast<double>();
+    if (law_.compensated) v -= Four::Map(error.data() + at).template cast<double>();
+    return v.head<3>();
   }
   Vector3d position_at(std::size_t at) const {
     return origin_ + exact(state_.x, state_.x_error, at);

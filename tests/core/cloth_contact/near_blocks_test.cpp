@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "core/cloth_contact/block_motion.h"
 #include "core/cloth_contact/pairs.h"
+#include "core/contact/nearest.h"
 #include "core/triangles/cut.h"
 #include "tests/support/core/scenes.h"
 #include "tests/support/core/triangle_meshes.h"
@@ -118,6 +121,65 @@ TEST(NearBlocks, AreKnownToBeApartWhereClothLiesFlat) {
   };
   EXPECT_EQ(unknown(0.2), 0);
   EXPECT_GT(unknown(3), 0);
+}
+
+// The least distance of what shares no particle, of each two blocks, m.
+std::map<BlockPair, double> least_distances(const Cloth& cloth, const Matrix3Xd& x) {
+  std::map<BlockPair, double> least;
+  for (const auto& [blocks, list] : all_pairs(cloth)) {
+    double squared = std::numeric_limits<double>::infinity();
+    for (const auto& [p, t] : list.corners) {
+      const auto& [a, b, c] = cloth.triangles[static_cast<std::size_t>(t)];
+      const auto [u, v, w] = nearest_in_triangle(x.col(p), x.col(a), x.col(b), x.col(c));
+      squared =
+          std::min(squared, (x.col(p) - u * x.col(a) - v * x.col(b) - w * x.col(c)).squaredNorm());
+    }
+    for (const auto& [e, f] : list.edges) {
+      const auto& [a, b] = cloth.edges[static_cast<std::size_t>(e)];
+      const auto& [c, d] = cloth.edges[static_cast<std::size_t>(f)];
+      const auto [s, t] = nearest_on_edges(x.col(a), x.col(b), x.col(c), x.col(d));
+      const Vector3d one = (1 - s) * x.col(a) + s * x.col(b),
+                     other = (1 - t) * x.col(c) + t * x.col(d);
+      squared = std::min(squared, (one - other).squaredNorm());
+    }
+    least[blocks] = std::sqrt(squared);
+  }
+  return least;
+}
+
+TEST(NearBlocks, KnowsNoTwoNodesToBeFartherApartThanTheyAre) {
+  for (const SheetDefinition& sheet :
+       {flat_sheet(17, 17, 0.01), sheet_of(cut_disc(Cut::kAlternating, 0.08, 0.01))}) {
+    const Cloth cloth({sheet});
+    NearBlocks near(cloth);
+    std::vector<NearBlocks::Node> nodes = {near.root()};
+    for (std::size_t k = 0; k < nodes.size(); ++k)
+      for (const int which : {0, 1})
+        if (nodes[k].count() > 1) nodes.push_back(NearBlocks::Node(nodes[k]).half(which));
+    int flat = 0;
+    for (const double turns : {0.01, 0.1, 0.2, 0.5, 3.0}) {
+      for (const double away : {0.0, 20.0}) {
+        SCOPED_TRACE(::testing::Message() << turns << " turns, " << away << " m away");
+        const Matrix3Xd x = rolled(sheet, turns, 2e-4).colwise() + Vector3d(away, -away, 0.1);
+        near.set(x);
+        const std::map<BlockPair, double> least = least_distances(cloth, x);
+        for (const NearBlocks::Node& one : nodes)
+          for (const NearBlocks::Node& other : nodes) {
+            // nodes lie in each other or beside each other
+            if (one.first > other.first || (one.last > other.first && one.number != other.number))
+              continue;
+            const double found = near.distance(one, other, 1);
+            if (one.number == other.number && found > 0) ++flat;
+            for (const auto& [blocks, distance] : least)
+              if (blocks.one >= one.first && blocks.one < one.last && blocks.other >= other.first &&
+                  blocks.other < other.last) {
+                ASSERT_LE(found, distance);
+              }
+          }
+      }
+    }
+    EXPECT_GT(flat, 20);
+  }
 }
 
 }  // namespace

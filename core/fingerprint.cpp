@@ -51,13 +51,13 @@ Scene rough_scene(const std::vector<BendingLaw>& laws) {
   return scene;
 }
 
-// Two sheets that touch, of which the seams of one close.
+// Two sheets that pass through each other, of which the seams of one close.
 Scene dressed_scene() {
   Scene scene = rough_scene({});
   for (const SheetShape& shape : {rough_mesh(), SheetShape(Grid{3, 5, 0.01})})
     scene.sheets.push_back(rough_sheet(shape, Isometric{}));
   std::vector<double>& start = scene.sheets[1].start_positions;
-  for (std::size_t i = 1; i < start.size(); i += 3) start[i] += 1e-3;
+  for (std::size_t i = 1; i < start.size(); i += 3) start[i] += 0.2 * (start[i - 1] - 0.01);
   std::vector<double>& open = scene.sheets[0].start_positions;
   open[open.size() - 3] += 0.02;
   scene.cloth_contact = true;

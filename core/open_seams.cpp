@@ -86,10 +86,11 @@ void OpenSeams::keep_out(const Contacts& contacts, double dt, MovingSheet& sheet
     const double sum = part[0] * part[0] + part[1] * part[1];
     if (sum == 0) continue;
 
-    // out, and no farther in
+    // back by what it came in, and out
     const Vector3d motion = (1 - share) * d_.col(ends[0]) + share * d_.col(ends[1]);
-    const Vector3d out = std::min(-nearest, kOutward * dt) / sum * normal;
-    const Vector3d stop = std::max(0.0, -motion.dot(normal)) / sum * normal;
+    const double approach = std::max(0.0, -motion.dot(normal));
+    const Vector3d out = std::min(-nearest, approach + kOutward * dt) / sum * normal;
+    const Vector3d stop = approach / sum * normal;
     for (std::size_t k = 0; k < 2; ++k) {
       if (part[k] == 0) continue;
       Move& move = moves[ends[k]];

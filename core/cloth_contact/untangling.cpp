@@ -32,7 +32,7 @@ bool Untangling::has(const std::array<int, 4>& particles) const {
 }
 
 void Untangling::add(int edge, int triangle, const Around& around, const Matrix3Xd& x) {
-  constexpr double kSpeed = 0.2;     // m/s
+  constexpr double kSpeed = 1;       // m/s
   constexpr double kHalfTurn = 0.2;  // of the line where the speed is half of that
   const auto& [p, q] = cloth_.edges[static_cast<std::size_t>(edge)];
   const std::array<int, 3> corners = cloth_.triangles[static_cast<std::size_t>(triangle)];

@@ -13,9 +13,11 @@ bool is_quiet(const Mesh& mesh, const VectorXd& inverse_mass, const Drive& drive
   for (Eigen::Index i = 0; i < after.v.cols(); ++i) {
     if (inverse_mass[i] == 0) continue;
     Vector3d v = after.v.col(i);
-    if (by_frame) v = (after.x.col(i) - before.x.col(i)) / drive.frame_step;
+    if (by_frame)
+      v = (after.x.col(i) - before.x.col(i)) / drive.frame_step;
+    else
+      squares += (v - before.v.col(i)).squaredNorm();
     energy += mesh.mass[i] / 2 * v.squaredNorm();
-    squares += (after.v.col(i) - before.v.col(i)).squaredNorm();
     ++free;
   }
   return squares <= free * most_change * most_change &&

@@ -7,8 +7,9 @@ namespace weft {
 // Whether a sheet hardly moved in a frame: kinetic energy and net forces, contact included, were
 // small. Forces as means over the frame, for those of one step are as rough as positions are
 // rounded, and as root mean square over the sheet, for single particles of stiff, light sheets
-// chatter for ever. height: of the sheet, m. by_frame: energy of what moved from frame to frame,
-// for what cloth presses into a collider is led out again in every step, at any speed.
+// chatter for ever. height: of the sheet, m. by_frame: energy of what moved from frame to frame
+// alone, for what cloth presses into a collider, or cloth, is led out again in every step, at any
+// speed; a force that lasts shows in the frames to come.
 bool is_quiet(const Mesh& mesh, const VectorXd& inverse_mass, const Drive& drive, double height,
               const SheetState& before, const SheetState& after, bool by_frame = false);
 

@@ -41,6 +41,9 @@ TEST_F(QuietSheet, MayHaveAnyEnergyWithinAFrameThatAddsUpToNoMotion) {
   before_.v(0, 5) = after_.v(0, 5) = 0.2;
   EXPECT_FALSE(quiet());
   EXPECT_TRUE(quiet(true));
+  after_.v = -before_.v;
+  before_.v(0, 6) = 0.2;
+  EXPECT_TRUE(quiet(true));
   after_.x.row(0).array() += 1.5e-3 * kFrameStep;
   EXPECT_FALSE(quiet(true));
 }

@@ -7,9 +7,9 @@
 
 namespace weft::client {
 
-// What is worn where a recording ends: its sheets, which start there, its bodies and holds.
-// Problem: what it cannot be read for, or a body that moves.
-v1::Scene worn_at_end(const std::string& recording);
+// What is worn at the end of the recording in a file: its sheets, which start there, its bodies and
+// holds. Throws Problem where there is none, or a body moves.
+v1::Scene worn_at_end(const std::string& path);
 
 // Moves panels away from the body, each along its outside, until what is worn is behind them.
 // m, the farthest.

@@ -142,6 +142,15 @@ TEST_F(Drape, OverWhatIsWornStaysOutsideOfIt) {
   EXPECT_THAT(over(path("tube.weft"), {"--body", path("pole.obj")}).err,
               HasSubstr("--body excludes --over"));
   EXPECT_THAT(over(path("pole.obj"), {}).err, HasSubstr("pole.obj: "));
+  v1::Scene moving = small_scene();
+  v1::Collider& ball = *moving.add_colliders();
+  ball.mutable_sphere()->set_radius_m(0.1);
+  ball.mutable_sphere()->mutable_center_m()->set_y(-1);
+  ball.add_path()->set_time_s(1);
+  ASSERT_EQ(run_weft({"record", scene_file(moving), "--to", "1", "-o", path("moving.weft")}).exit,
+            0);
+  EXPECT_THAT(over(path("moving.weft"), {}).err,
+              HasSubstr("moving.weft: \"collider\" moves; what is worn stands still"));
 }
 
 TEST_F(Drape, OfWhatIsTooWideSlidesDownAndIsNotGood) {

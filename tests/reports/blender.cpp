@@ -109,7 +109,7 @@ std::vector<Matrix3Xd> read_positions(std::ifstream& file, const Scene& scene) {
   for (const SheetDefinition& sheet : scene.sheets) {
     Eigen::Matrix3Xf values(3, sheet.particle_count());
     file.read(reinterpret_cast<char*>(values.data()),
-              static_cast<std::streamsize>(values.size() * sizeof(float)));
+              values.size() * static_cast<std::streamsize>(sizeof(float)));
     x.push_back(values.cast<double>());
   }
   if (!file) throw std::runtime_error("Blender wrote too few positions");

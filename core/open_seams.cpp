@@ -6,6 +6,8 @@
 #include <map>
 #include <set>
 
+#include "core/cloth_contact/cuts.h"
+
 namespace weft {
 namespace {
 
@@ -40,6 +42,41 @@ Depth depth_between(const Contacts& contacts, const Vector3d& from, const Vector
 }
 
 }  // namespace
+
+LeftOut through_cloth_at_start(const Scene& scene, const LeftOut& open) {
+  constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+  std::vector<Matrix3Xd> x;
+  std::vector<std::vector<std::array<int, 3>>> triangles;
+  std::vector<std::vector<std::vector<std::size_t>>> around;  // particles of each sheet
+  LeftOut through;
+  for (const SheetDefinition& sheet : scene.sheets) {
+    x.push_back(start_positions(sheet));
+    triangles.push_back(triangles_of(sheet.shape));
+    auto& ring = around.emplace_back(static_cast<std::size_t>(sheet.particle_count()));
+    for (std::size_t t = 0; t < triangles.back().size(); ++t)
+      for (const int particle : triangles.back()[t])
+        ring[static_cast<std::size_t>(particle)].push_back(t);
+    through.emplace_back(triangles.back().size());
+  }
+  const auto note = [&](std::size_t s, const auto& particles, bool within) {
+    if (open[s].empty()) return;
+    std::vector<std::size_t> having = around[s][static_cast<std::size_t>(particles[0])];
+    std::erase_if(having, [&](std::size_t t) {
+      return !std::ranges::all_of(particles, [&](int particle) {
+        return std::ranges::find(triangles[s][t], particle) != triangles[s][t].end();
+      });
+    });
+    if (!std::ranges::all_of(having, [&](std::size_t t) { return open[s][t]; })) return;
+    if (within) through[s] = open[s];
+    for (const std::size_t t : having) through[s][t] = true;
+  };
+  for (const ClothCut& cut : count_cuts(scene.sheets, x, kAll).first) {
+    const bool within = cut.edge_sheet == cut.triangle_sheet;
+    note(cut.edge_sheet, cut.edge, within);
+    note(cut.triangle_sheet, cut.triangle, within);
+  }
+  return through;
+}
 
 OpenSeams::OpenSeams(const SheetDefinition& sheet, const std::vector<bool>& stretched) {
   std::set<std::array<int, 2>> edges;

@@ -3,10 +3,15 @@
 #include <array>
 #include <vector>
 
+#include "core/cloth_contact/cloth.h"
 #include "core/contact/contact.h"
 #include "core/moving_sheet.h"
 
 namespace weft {
+
+// Of triangles at open seams, those that start through another sheet, or that it starts through; of
+// a sheet where one starts so through the sheet itself, all: cloth contact would keep them there.
+LeftOut through_cloth_at_start(const Scene& scene, const LeftOut& open);
 
 // Edges that reach from panel to panel while a seam closes. Colliders push particles, and such an
 // edge has none between its ends: it would be drawn through a shoulder. So it is kept out as a

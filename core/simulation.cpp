@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
-#include <limits>
 
-#include "core/cloth_contact/cuts.h"
 #include "core/cloth_contact/tangles.h"
 #include "core/contact/contact.h"
 #include "core/forces/air.h"
@@ -21,37 +19,6 @@ NextStates& next_states(std::size_t sheets) {
   static thread_local NextStates states;
   states.resize(sheets);
   return states;
-}
-
-// Of triangles at open seams, those that start through another sheet, or that it starts through; of
-// a sheet where one starts so through the sheet itself, all.
-LeftOut through_cloth_at_start(const Scene& scene, const LeftOut& open) {
-  constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
-  std::vector<Matrix3Xd> x;
-  LeftOut through;
-  for (const SheetDefinition& sheet : scene.sheets) {
-    x.push_back(start_positions(sheet));
-    through.emplace_back(static_cast<std::size_t>(triangle_count(sheet.shape)));
-  }
-  const auto note = [&](std::size_t s, const auto& particles, bool within) {
-    const auto triangles = triangles_of(scene.sheets[s].shape);
-    std::vector<std::size_t> having;
-    for (std::size_t t = 0; t < triangles.size(); ++t)
-      if (std::ranges::all_of(particles, [&](int particle) {
-            return std::ranges::find(triangles[t], particle) != triangles[t].end();
-          }))
-        having.push_back(t);
-    if (open[s].empty() || !std::ranges::all_of(having, [&](std::size_t t) { return open[s][t]; }))
-      return;
-    if (within) through[s] = open[s];
-    for (const std::size_t t : having) through[s][t] = true;
-  };
-  for (const ClothCut& cut : count_cuts(scene.sheets, x, kAll).first) {
-    const bool within = cut.edge_sheet == cut.triangle_sheet;
-    note(cut.edge_sheet, cut.edge, within);
-    note(cut.triangle_sheet, cut.triangle, within);
-  }
-  return through;
 }
 
 }  // namespace

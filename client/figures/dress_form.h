@@ -1,8 +1,11 @@
 #pragma once
 
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/figures/surface_nets.h"
@@ -16,6 +19,8 @@ struct Measures {
   FigureKind figure = FigureKind::kFemale;
   std::optional<double> stature{}, bust{}, underbust{}, waist{}, top_hip{}, hip{};
   double arm_angle = 40;  // below the level, degrees
+
+  bool operator==(const Measures&) const = default;
 };
 
 // Sizes of shops, by which bust, waist and hip girths follow from a number.
@@ -65,5 +70,15 @@ struct DressForm {
   const Girth& girth(const std::string& name) const;  // one of `girths`
 };
 DressForm make_dress_form(const Measures& measures);
+
+// Forms that are asked for again, each made once. Thread-safe.
+class DressForms {
+ public:
+  std::shared_ptr<const DressForm> of(const Measures& measures);
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::pair<Measures, std::shared_ptr<const DressForm>>> made_;
+};
 
 }  // namespace weft::client

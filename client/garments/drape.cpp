@@ -42,9 +42,10 @@ GarmentScene make_drape(Connection& connection, const Drape& drape) {
       .deflate_m = drape.deflate_m,
       .edge_field = drape.edge_field};
   std::string notes;
-  std::optional<DressForm> form;
+  std::shared_ptr<const DressForm> form;
   const bool on_form = drape.bodies.empty() && drape.over.empty();
-  if (own || on_form) form = make_dress_form(drape.measures);
+  if (own || on_form)
+    form = (drape.forms ? drape.forms : std::make_shared<DressForms>())->of(drape.measures);
   if (own) {
     order.name = drape.garment;
     order.pattern = make_garment(drape.garment, *form);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@ namespace weft::client {
 struct Drape {
   std::string garment{};                 // a template, or a pattern file
   Measures measures{};                   // of the dress form
+  std::shared_ptr<DressForms> forms{};   // to have it from; none: it is made
   std::vector<std::string> bodies{};     // files; none: the dress form
   std::string over{};                    // a recording of what is worn beneath, and by whom
   std::optional<v1::Textile> textile{};  // none: the usual one

@@ -455,7 +455,7 @@ const std::vector<Template>& all_templates() {
       {{"tshirt", "A T-shirt: front, back, sleeves of two halves", kUsualTextile}, tshirt},
       {{"skirt", "A skirt to the knee: front and back with darts, a waistband", "denim_11oz"},
        skirt},
-      {{"trousers", "Trousers to the ankle: legs of a front and a back, a waistband", kUsualTextile,
+      {{"trousers", "Trousers to the ankle: legs of a front and a back, a waistband", "denim_11oz",
         0.02},
        trousers},
       {{"dress", "A dress to the knee: a fitted top with sleeves, a gathered skirt",

@@ -239,6 +239,7 @@ class ScriptReader {
   // Its files are read here to find what is wrong with them.
   Drape read_drape(Fields& fields, const TemplateOptions& options) const {
     Drape drape{.measures = read_measures(fields),
+                .forms = forms_,
                 .textile = options.textile,
                 .edge_m = fields.number("edge_m", 0.002, 0.1),
                 .deflate_m = fields.number("deflate_m", 0, 0.1),
@@ -599,6 +600,7 @@ class ScriptReader {
   const std::map<std::string, std::string>& given_;
   Faults faults_;
   Script script_;
+  const std::shared_ptr<DressForms> forms_ = std::make_shared<DressForms>();  // of all cases
   std::vector<std::string> sessions_, snapshots_;  // of the case, in order of creation
   std::size_t steps_read_ = 0;
 };

@@ -294,6 +294,17 @@ double girth_of(const nlohmann::json& built, const std::string& label) {
   return sum;
 }
 
+TEST(DressForms, AreMadeOnceForEachPerson) {
+  client::DressForms forms;
+  const auto forty = client::measures_of_size(client::FigureKind::kFemale, 40);
+  const auto first = forms.of(forty);
+  EXPECT_EQ(forms.of(forty), first);
+  EXPECT_EQ(first->mesh.vertices, client::make_dress_form(forty).mesh.vertices);
+  auto tall = forty;
+  tall.stature = 1.85;
+  EXPECT_NE(forms.of(tall), first);
+}
+
 // Every garment, by figure and size.
 class GarmentTemplates : public Garment,
                          public ::testing::WithParamInterface<std::pair<client::FigureKind, int>> {

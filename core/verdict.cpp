@@ -8,12 +8,14 @@
 #include "core/model/strain.h"
 #include "core/model/text.h"
 #include "core/moving_sheet.h"
+#include "core/sheet_factory.h"
 
 namespace weft {
 namespace {
 
 constexpr double kMostStrain99 = 0.1;  // of cloth that fits
-constexpr double kMostSlid = 0.03;     // m
+constexpr double kMostSlid = 0.03;     // of what was held, m
+constexpr double kMostFallen = 0.15;   // of what hangs on shoulders, m
 constexpr double kMostDepth = 1e-4;    // of a particle in a collider, m
 
 struct Strained {
@@ -115,6 +117,15 @@ void find_slid(const Scene& scene, const std::vector<MovingSheet>& sheets,
     for (const int i : hold.particles) sum += (x[s].col(i) - sheets[s].start(i)).dot(down);
     verdict.slid = std::max(verdict.slid, sum / static_cast<double>(hold.particles.size()));
   }
+  for (std::size_t s = 0; s < x.size(); ++s) {
+    const bool held = std::ranges::any_of(scene.dressing->holds, [&](const Hold& hold) {
+      return static_cast<std::size_t>(hold.sheet) == s;
+    });
+    const auto sewn = triangles_at_open_seams(scene.sheets[s]);
+    if (held || std::ranges::find(sewn, true) == sewn.end()) continue;
+    const Vector3d start = start_positions(scene.sheets[s]).rowwise().mean();
+    verdict.fallen = std::max(verdict.fallen, (x[s].rowwise().mean() - start).dot(down));
+  }
 }
 
 std::string cuts_text(const Scene& scene, std::int64_t cuts, double time) {
@@ -140,6 +151,9 @@ void find_faults(const Scene& scene, double time, Verdict& verdict) {
     fault("SLID_DOWN",
           join("what was held has come down by ", 1000 * verdict.slid, " mm, more than ",
                1000 * kMostSlid, " mm: it is too wide there, or too smooth"));
+  if (verdict.fallen > kMostFallen)
+    fault("SLID_DOWN", join("the garment has come down by ", 1000 * verdict.fallen,
+                            " mm, more than ", 1000 * kMostFallen, " mm: nothing holds it up"));
   if (const double strain = std::max(verdict.strain_warp, verdict.strain_weft);
       verdict.dressed && strain > kMostStrain99)
     fault(

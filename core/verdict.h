@@ -29,6 +29,7 @@ struct Verdict {
   std::string tightest;         // panel with most cloth that is strained too much
   double largest_pressure = 0;  // of colliders on cloth, Pa
   double slid = 0;              // of what was held: farthest down from its start, its mean, m
+  double fallen = 0;            // of sewn sheets without holds: their mean, m
   std::vector<Fault> faults;    // none: it is good
 };
 

@@ -123,7 +123,8 @@ is good is its verdict:
   NOT_AT_REST  the cloth still moves
   CLOTH_CUTS   edges pass through cloth
   INSIDE_BODY  particles are inside a body
-  SLID_DOWN    what was held has come down by more than 30 mm
+  SLID_DOWN    what was held has come down by more than 30 mm, or a garment that
+               nothing held by more than 150 mm
   TOO_TIGHT    1 % of the cloth is strained by more than 10 %
 )"},
     Topic{"recordings", "Files that hold frames, and what can be done with them",

@@ -1,4 +1,4 @@
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
@@ -232,6 +232,12 @@ TEST(Dressing, IsJudgedByWhatIsWrongWithIt) {
   Simulation wide(scene);
   dress(wide, 150);
   EXPECT_EQ(codes(wide), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN"}));
+
+  scene.dressing->holds.clear();
+  Simulation falling(scene);
+  dress(falling, 150);
+  EXPECT_EQ(codes(falling), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN"}));
+  EXPECT_THAT(falling.verdict().faults[1].message, ::testing::HasSubstr("nothing holds it up"));
 }
 
 // How near edges of the tube come to an upright axis, m.

@@ -20,7 +20,7 @@ void Scheduler::wake(const std::shared_ptr<Task>& task) {
       note_due();
       [[fallthrough]];
     case Task::Phase::kIdle:
-      queue(task);
+      queue(task, From::kWake);
       return;
     case Task::Phase::kRunning:
       task->phase_ = Task::Phase::kRunningAndWoken;
@@ -35,7 +35,7 @@ bool Scheduler::post(std::function<void()> work) {
   std::lock_guard lock(mutex_);
   if (stopping_ || posted_ >= kMaxPosted) return false;
   ++posted_;
-  push(posted_turns_, {nullptr, std::move(work), false});
+  push(posted_turns_, From::kWake, {nullptr, std::move(work), false});
   return true;
 }
 
@@ -43,20 +43,22 @@ bool Scheduler::help(std::function<void()> work) {
   std::lock_guard lock(mutex_);
   if (stopping_ || idle_ <= ready_.size()) return false;
   ++posted_;
-  push(posted_turns_, {nullptr, std::move(work), true});
+  push(posted_turns_, From::kWake, {nullptr, std::move(work), true});
   return true;
 }
 
-void Scheduler::push(std::int64_t& turns, Job job) {
+void Scheduler::push(std::int64_t& turns, From from, Job job) {
   if (!job.helps) ++wanted_;
-  turns = std::max(turns, turns_);
+  turns = std::max(turns, turns_ - (from == From::kWake ? kShare / kTurn : 0));
   ready_.emplace(turns, std::move(job));
+  note_urgent();
   changed_.notify_one();
 }
 
 Scheduler::Job Scheduler::pop() {
   auto next = ready_.extract(ready_.begin());
   turns_ = std::max(turns_, next.key());
+  note_urgent();
   Job job = std::move(next.mapped());
   if (!job.helps) --wanted_;
   return job;
@@ -91,18 +93,20 @@ void Scheduler::work() {
   }
 }
 
+void Scheduler::note_urgent() { urgent_ = !ready_.empty() && ready_.begin()->first < turns_; }
+
 // Precondition: the task is in no queue.
-void Scheduler::queue(std::shared_ptr<Task> task) {
+void Scheduler::queue(std::shared_ptr<Task> task, From from) {
   task->phase_ = Task::Phase::kQueued;
   std::int64_t& turns = task->turns_;
-  push(turns, {std::move(task), nullptr, false});
+  push(turns, from, {std::move(task), nullptr, false});
 }
 
 void Scheduler::queue_due() {
   const auto now = Clock::now();
   while (!waiting_.empty() && waiting_.begin()->first <= now) {
     auto entry = waiting_.extract(waiting_.begin());
-    queue(std::move(entry.mapped()));
+    queue(std::move(entry.mapped()), From::kWake);
   }
   note_due();
 }
@@ -130,7 +134,7 @@ void Scheduler::run(std::unique_lock<std::mutex>& lock, Job job) {
   job.task->turns_ += turns();
 
   if (job.task->phase_ == Task::Phase::kRunningAndWoken || (due && *due <= Clock::now())) {
-    queue(std::move(job.task));
+    queue(std::move(job.task), From::kSlice);
   } else if (due) {
     job.task->phase_ = Task::Phase::kWaiting;
     waiting_.emplace(*due, std::move(job.task));

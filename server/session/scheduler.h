@@ -42,6 +42,9 @@ class Scheduler {
  public:
   static constexpr std::size_t kMaxPosted = 256;
   static constexpr std::chrono::microseconds kTurn{200};  // what a shorter slice counts as
+  // For which those that share time may go on at once; by so much less had, at most, those that are
+  // woken come first.
+  static constexpr std::chrono::microseconds kShare{5000};
 
   explicit Scheduler(int threads);
   ~Scheduler();  // stops
@@ -59,6 +62,9 @@ class Scheduler {
   // Whether something waits for a thread.
   bool busy() const { return wanted_ > 0 || Clock::now().time_since_epoch().count() >= next_due_; }
 
+  // Whether what waits shall not wait for long: it was woken, and has had less time than others.
+  bool urgent() const { return urgent_ || Clock::now().time_since_epoch().count() >= next_due_; }
+
   // Lets each thread finish its slice, and drops the rest.
   void stop();
 
@@ -71,10 +77,12 @@ class Scheduler {
   };
 
   void work();
-  void push(std::int64_t& turns, Job job);
+  enum class From { kWake, kSlice };
+  void push(std::int64_t& turns, From from, Job job);
   Job pop();
   void note_due();
-  void queue(std::shared_ptr<Task> task);
+  void note_urgent();
+  void queue(std::shared_ptr<Task> task, From from);
   void queue_due();
   void run(std::unique_lock<std::mutex>& lock, Job job);
 
@@ -83,9 +91,10 @@ class Scheduler {
   std::multimap<std::int64_t, Job> ready_;  // by turns that the task has had
   std::int64_t turns_ = 0;                  // of the last to run: others come with no fewer
   std::int64_t posted_turns_ = 0;
-  std::atomic<int> wanted_ = 0;  // jobs in ready_ that do not help
-  std::size_t idle_ = 0;         // threads that wait
-  std::size_t posted_ = 0;       // jobs in ready_ with work
+  std::atomic<bool> urgent_ = false;  // whether the first of ready_ has had fewer
+  std::atomic<int> wanted_ = 0;       // jobs in ready_ that do not help
+  std::size_t idle_ = 0;              // threads that wait
+  std::size_t posted_ = 0;            // jobs in ready_ with work
   std::multimap<Clock::time_point, std::shared_ptr<Task>> waiting_;  // by due time
   std::atomic<Clock::rep> next_due_ = kNever;                        // of waiting_
   bool stopping_ = false;

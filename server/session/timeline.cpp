@@ -26,7 +26,8 @@ FramePart Timeline::advance(Scheduler& scheduler) {
       std::this_thread::yield();
       yielded = now;
     }
-    return now - begin >= kSlice || (now - begin >= kBusySlice && scheduler.busy());
+    return now - begin >= kSlice || (now - begin >= Scheduler::kShare && scheduler.busy()) ||
+           (now - begin >= kBusySlice && scheduler.urgent());
   };
   const int most_threads = simulation.most_threads();
   FramePart part{};

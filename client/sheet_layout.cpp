@@ -4,19 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
+#include "client/message_values.h"
 #include "client/output/text.h"
 
 namespace weft::client {
 namespace {
-
-template <class Value>
-std::vector<Value> values_of(const std::string& bytes) {
-  std::vector<Value> values(bytes.size() / sizeof(Value));
-  if (!values.empty()) std::memcpy(values.data(), bytes.data(), values.size() * sizeof(Value));
-  return values;
-}
 
 std::vector<std::array<float, 2>> corners_of(const v1::MeshData& mesh) {
   const auto planes = values_of<float>(mesh.flat_m());

@@ -1,11 +1,8 @@
 #pragma once
 
-#include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "client/figures/surface_nets.h"
@@ -70,15 +67,5 @@ struct DressForm {
   const Girth& girth(const std::string& name) const;  // one of `girths`
 };
 DressForm make_dress_form(const Measures& measures);
-
-// Forms that are asked for again, each made once. Thread-safe.
-class DressForms {
- public:
-  std::shared_ptr<const DressForm> of(const Measures& measures);
-
- private:
-  std::mutex mutex_;
-  std::vector<std::pair<Measures, std::shared_ptr<const DressForm>>> made_;
-};
 
 }  // namespace weft::client

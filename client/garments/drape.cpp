@@ -44,8 +44,7 @@ GarmentScene make_drape(Connection& connection, const Drape& drape) {
   std::string notes;
   std::shared_ptr<const DressForm> form;
   const bool on_form = drape.bodies.empty() && drape.over.empty();
-  if (own || on_form)
-    form = (drape.forms ? drape.forms : std::make_shared<DressForms>())->of(drape.measures);
+  if (own || on_form) form = drape.forms->of(drape.measures);
   if (own) {
     order.name = drape.garment;
     order.pattern = make_garment(drape.garment, *form);
@@ -56,10 +55,10 @@ GarmentScene make_drape(Connection& connection, const Drape& drape) {
     order.pattern = std::move(read.pattern);
     for (const std::string& note : read.notes) notes += note + '\n';
   }
-  v1::Scene worn;
+  std::optional<Worn> worn;
   if (!drape.over.empty()) {
     worn = worn_at_end(drape.over);
-    if (const double way = place_over(order.pattern, worn); way > 0)
+    if (const double way = place_over(order.pattern, *worn); way > 0)
       notes += fmt::format("panels start up to {:.0f} mm farther out, clear of what is worn\n",
                            1000 * way);
   }
@@ -68,7 +67,7 @@ GarmentScene make_drape(Connection& connection, const Drape& drape) {
 
   GarmentScene made = make_garment_scene(connection, order);
   made.text.insert(0, notes);
-  if (!drape.over.empty()) wear_over(made.scene, std::move(worn));
+  if (worn) wear_over(made.scene, std::move(*worn));
   if (drape.accuracy) made.scene.mutable_solver()->set_accuracy(*drape.accuracy);
   for (const auto& [place, value] : drape.values) set_field(made.scene, place, value);
   return made;

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/figures/dress_form.h"
+#include "client/figures/dress_forms.h"
 #include "client/garments/garment_scene.h"
 #include "client/imports/garment_code.h"
 
@@ -14,9 +14,10 @@ namespace weft::client {
 
 // Who wears what.
 struct Drape {
-  std::string garment{};                 // a template, or a pattern file
-  Measures measures{};                   // of the dress form
-  std::shared_ptr<DressForms> forms{};   // to have it from; none: it is made
+  std::string garment{};  // a template, or a pattern file
+  Measures measures{};    // of the dress form
+  // To have it from.
+  std::shared_ptr<DressForms> forms = std::make_shared<DressForms>();
   std::vector<std::string> bodies{};     // files; none: the dress form
   std::string over{};                    // a recording of what is worn beneath, and by whom
   std::optional<v1::Textile> textile{};  // none: the usual one

@@ -1,11 +1,11 @@
 #include "client/render/body.h"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 #include <string_view>
 
 #include "client/exports/normals.h"
+#include "client/message_values.h"
 
 namespace weft::client {
 namespace {
@@ -25,20 +25,14 @@ Vector3d offset_at(const google::protobuf::RepeatedPtrField<v1::Keyframe>& path,
   return from + share * (vector_of(next->offset_m()) - from);
 }
 
-std::vector<float> floats_of(std::string_view bytes) {
-  std::vector<float> values(bytes.size() / sizeof(float));
-  if (!values.empty()) std::memcpy(values.data(), bytes.data(), values.size() * sizeof(float));
-  return values;
-}
-
 // Planes x, y, z of the vertices at that time.
 std::vector<float> positions_at(const v1::MeshData& mesh, double time_s) {
   const auto& times = mesh.poses().times_s();
-  if (times.empty()) return floats_of(mesh.positions_m());
+  if (times.empty()) return values_of<float>(mesh.positions_m());
   const std::string_view all = mesh.poses().positions_m();
   const std::size_t size = all.size() / static_cast<std::size_t>(times.size());
   const auto pose = [&](std::ptrdiff_t p) {
-    return floats_of(all.substr(static_cast<std::size_t>(p) * size, size));
+    return values_of<float>(all.substr(static_cast<std::size_t>(p) * size, size));
   };
   const std::ptrdiff_t next = std::upper_bound(times.begin(), times.end(), time_s) - times.begin();
   std::vector<float> from = pose(std::max(next - 1, std::ptrdiff_t{0}));
@@ -66,9 +60,7 @@ Solid solid_of(const v1::MeshData& mesh, const Vector3d& offset, double time_s) 
     return std::vector<double>(first, first + static_cast<std::ptrdiff_t>(count));
   };
   solid.corners = {plane(0), plane(1), plane(2)};
-  solid.triangles.resize(mesh.triangles().size() / sizeof(std::uint32_t));
-  std::memcpy(solid.triangles.data(), mesh.triangles().data(),
-              solid.triangles.size() * sizeof(std::uint32_t));
+  solid.triangles = values_of<std::uint32_t>(mesh.triangles());
   if (std::any_of(solid.triangles.begin(), solid.triangles.end(),
                   [&](std::uint32_t i) { return i >= count; }))
     solid.triangles.clear();
@@ -88,12 +80,8 @@ Body body_of(const v1::Collider& collider, const Vector3d& offset, double time_s
     }
     case v1::Collider::kBox: {
       const v1::Box& box = collider.box();
-      Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
-      if (box.has_rotation()) {
-        const v1::Rotation& given = box.rotation();
-        rotation = Eigen::Quaterniond(given.w(), given.x(), given.y(), given.z()).normalized();
-      }
-      return Cuboid{vector_of(box.center_m()) + offset, vector_of(box.half_size_m()), rotation};
+      return Cuboid{vector_of(box.center_m()) + offset, vector_of(box.half_size_m()),
+                    rotation_of(box)};
     }
     case v1::Collider::kMesh:
       return solid_of(collider.mesh().data(), offset, time_s);
@@ -150,8 +138,6 @@ Way way_from(const HalfSpace& space, const Vector3d& place, double /*rounding*/)
 }
 
 }  // namespace
-
-Vector3d vector_of(const v1::Vector3& value) { return {value.x(), value.y(), value.z()}; }
 
 std::vector<Body> bodies_at(const v1::Scene& scene, double time_s) {
   std::vector<Body> bodies;

@@ -50,6 +50,4 @@ Way way_out(const Body& body, const Eigen::Vector3d& place, double rounding = 0)
 // Balls that reach as far as the body does in every direction; of a half space none.
 std::vector<Ball> hull_of(const Body& body);
 
-Eigen::Vector3d vector_of(const v1::Vector3& value);
-
 }  // namespace weft::client

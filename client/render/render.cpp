@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "client/exports/output_file.h"
+#include "client/message_values.h"
 #include "client/output/text.h"
 #include "client/problem.h"
 #include "client/render/picture.h"

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "client/figures/dress_forms.h"
 #include "client/figures/mesh_file.h"
 #include "client/garments/garment_templates.h"
 #include "client/garments/pattern_file.h"

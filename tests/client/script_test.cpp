@@ -32,6 +32,21 @@ class ScriptTest : public ClientTest {
     return refused.err;
   }
 
+  // What the command answers that is stopped once a session is beyond frame 3.
+  Outcome stopped(const std::vector<std::string>& arguments) {
+    std::stop_source stop;
+    Outcome outcome;
+    std::thread running([&] { outcome = weft(arguments, stop.get_token()); });
+    const auto is_running = [&] {
+      const auto list = ask({"session", "list"})["sessions"];
+      return !list.empty() && list[0]["frame"] > 3;
+    };
+    while (!is_running()) std::this_thread::yield();
+    stop.request_stop();
+    running.join();
+    return outcome;
+  }
+
   std::size_t sessions() { return ask({"session", "list"})["sessions"].size(); }
 };
 
@@ -432,16 +447,7 @@ steps:
   - record: {file: cloth.weft}
   - run: {until_frame: 900000000}
 )");
-  std::stop_source stop;
-  Outcome outcome;
-  std::thread running([&] { outcome = weft({"script", file}, stop.get_token()); });
-  const auto is_running = [&] {
-    const auto list = ask({"session", "list"})["sessions"];
-    return !list.empty() && list[0]["frame"] > 3;
-  };
-  while (!is_running()) std::this_thread::yield();
-  stop.request_stop();
-  running.join();
+  const Outcome outcome = stopped({"script", file});
   EXPECT_EQ(outcome.exit, 130);
   EXPECT_EQ(sessions(), 0);
   EXPECT_EQ(weft({"verify", path("cloth.weft")}).exit, 0);
@@ -454,18 +460,7 @@ steps:
   - create: {scene: scene.json}
   - run: {until_frame: $last}
 )");
-  std::stop_source stop;
-  Outcome outcome;
-  std::thread running([&] {
-    outcome = weft({"script", file, "--junit", path("cloth.xml"), "--json"}, stop.get_token());
-  });
-  const auto is_running = [&] {
-    const auto list = ask({"session", "list"})["sessions"];
-    return !list.empty() && list[0]["frame"] > 3;
-  };
-  while (!is_running()) std::this_thread::yield();
-  stop.request_stop();
-  running.join();
+  const Outcome outcome = stopped({"script", file, "--junit", path("cloth.xml"), "--json"});
   EXPECT_EQ(outcome.exit, 130);
   const auto cases = nlohmann::json::parse(outcome.out)["cases"];
   EXPECT_TRUE(cases[0]["passed"]);

@@ -117,6 +117,12 @@ void find_slid(const Scene& scene, const std::vector<MovingSheet>& sheets,
     for (const int i : hold.particles) sum += (x[s].col(i) - sheets[s].start(i)).dot(down);
     verdict.slid = std::max(verdict.slid, sum / static_cast<double>(hold.particles.size()));
   }
+}
+
+void find_fallen(const Scene& scene, const std::vector<Matrix3Xd>& x, Verdict& verdict) {
+  const Vector3d& gravity = scene.environment.gravity;
+  if (!scene.dressing || gravity.isZero()) return;
+  const Vector3d down = gravity.normalized();
   for (std::size_t s = 0; s < x.size(); ++s) {
     const bool held = std::ranges::any_of(scene.dressing->holds, [&](const Hold& hold) {
       return static_cast<std::size_t>(hold.sheet) == s;
@@ -176,6 +182,7 @@ Verdict judge(const Scene& scene, const MovingBodies& bodies,
   find_strains(scene, x, verdict);
   find_inside(scene, bodies, x, time, verdict);
   find_slid(scene, sheets, x, verdict);
+  find_fallen(scene, x, verdict);
   for (std::size_t s = 0; s < sheets.size(); ++s)
     if (!scene.colliders.empty() && x[s].cols() > 0)
       verdict.largest_pressure =

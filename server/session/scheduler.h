@@ -60,10 +60,10 @@ class Scheduler {
   [[nodiscard]] bool help(std::function<void()> work);
 
   // Whether something waits for a thread.
-  bool busy() const { return wanted_ > 0 || Clock::now().time_since_epoch().count() >= next_due_; }
+  bool busy() const { return wanted_ > 0 || is_due(); }
 
   // Whether what waits shall not wait for long: it was woken, and has had less time than others.
-  bool urgent() const { return urgent_ || Clock::now().time_since_epoch().count() >= next_due_; }
+  bool urgent() const { return urgent_ || is_due(); }
 
   // Lets each thread finish its slice, and drops the rest.
   void stop();
@@ -76,8 +76,10 @@ class Scheduler {
     bool helps = false;  // of help()
   };
 
+  enum class From { kWake, kSlice };  // where a task comes from
+
+  bool is_due() const { return Clock::now().time_since_epoch().count() >= next_due_; }
   void work();
-  enum class From { kWake, kSlice };
   void push(std::int64_t& turns, From from, Job job);
   Job pop();
   void note_due();
@@ -89,7 +91,7 @@ class Scheduler {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::multimap<std::int64_t, Job> ready_;  // by turns that the task has had
-  std::int64_t turns_ = 0;                  // of the last to run: others come with no fewer
+  std::int64_t turns_ = 0;                  // most of those that ran: others begin near them
   std::int64_t posted_turns_ = 0;
   std::atomic<bool> urgent_ = false;  // whether the first of ready_ has had fewer
   std::atomic<int> wanted_ = 0;       // jobs in ready_ that do not help

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <atomic>
 #include <future>
 #include <latch>
@@ -41,6 +42,27 @@ TEST(Scheduler, LetsTasksOfShortSlicesRunMoreOfThem) {
   scheduler.wake(slow);
   scheduler.wake(fast);
   EXPECT_LT(done.get_future().get(), kShort / 2);
+  scheduler.stop();
+}
+
+TEST(Scheduler, IsUrgentForWhatIsWokenAndHasHadLessTime) {
+  Scheduler scheduler(1);
+  const auto rested =
+      std::make_shared<Lambda>([]() -> std::optional<Clock::time_point> { return std::nullopt; });
+  std::promise<std::array<bool, 2>> urgent;  // before it is woken, and after
+  const auto busy =
+      std::make_shared<Lambda>([&, slices = 0]() mutable -> std::optional<Clock::time_point> {
+        if (++slices == 1) {
+          std::this_thread::sleep_for(2 * Scheduler::kShare);
+          return Clock::time_point::min();
+        }
+        const bool before = scheduler.urgent();
+        scheduler.wake(rested);
+        urgent.set_value({before, scheduler.urgent()});
+        return std::nullopt;
+      });
+  scheduler.wake(busy);
+  EXPECT_THAT(urgent.get_future().get(), ElementsAre(false, true));
   scheduler.stop();
 }
 

@@ -96,6 +96,7 @@ json order_of(const Scene& scene, int frames) {
 // What a command writes; nothing where it fails.
 std::optional<std::string> output_of(const std::string& command) {
   FILE* pipe = ::popen(command.c_str(), "r");
+  if (pipe == nullptr) return std::nullopt;
   std::string text;
   std::array<char, 4096> part{};
   while (const std::size_t size = std::fread(part.data(), 1, part.size(), pipe))
@@ -129,8 +130,8 @@ BlenderRun run_blender(const Scene& scene, int frames) {
   std::ofstream(folder.path("order.json")) << order_of(scene, frames);
   const auto said = output_of(fmt::format(
       "blender --background --factory-startup --threads 1 --python-exit-code 1 --python "
-      "{}/../reports/blender_cloth.py -- {} 2>&1",
-      WEFT_TEST_DATA_DIR, folder.path("")));
+      "{} -- {} 2>&1",
+      WEFT_BLENDER_CLOTH, folder.path("")));
   if (!said) throw std::runtime_error("Blender fails");
   BlenderRun run;
   run.frames = json::parse(std::ifstream(folder.path("times.json"))).get<std::vector<double>>();

@@ -159,8 +159,7 @@ Outcome contacts(Form form) {
   const double late = beside.frame.quantile(0.99), late_before = before.frame.quantile(0.99);
   return {.figure = fmt::format(
               "{} sessions x {} frames: {} of {} received, {} differing, {} with cuts; each within "
-              "{} of "
-              "the one before; p99 lateness of 10 paced sessions beside them {}, {} without",
+              "{} of the one before; p99 lateness of 10 paced sessions beside them {}, {} without",
               all.size() * static_cast<std::size_t>(sessions), frames, received, wanted,
               differing.load(), with_cuts.load(), client::seconds_text(longest.count()),
               client::seconds_text(late), client::seconds_text(late_before)),

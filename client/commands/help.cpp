@@ -99,7 +99,9 @@ A seam joins a first_side and a second_side, each of runs of edges one after the
 other: {"panel": "front", "edge": 1}, or with begin and end a part of that edge.
 The second side runs against the first, as panels with the same side outward
 do; same_direction turns one of them over. Of sides of two lengths the longer
-one is gathered evenly. A dart is a notch whose sides are sewn.
+one is gathered evenly. A dart is a notch whose sides are sewn. With fold_rad a
+seam is pressed to an angle: 3 folds the panels outside on outside, as a collar
+lies, -3 inside on inside; a crease is a panel cut there and sewn again.
 
   weft drape tshirt --size 40 -o tshirt.glb           put on, until it hangs
   weft garment new tshirt --size 40 -o tshirt.json    by the tape, or by size

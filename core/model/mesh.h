@@ -111,10 +111,20 @@ struct BendStiffness {
   double warp = 0, weft = 0, twist = 0;
 };
 
+// An edge that keeps an angle, as Fold has it. The first two particles are its ends; with the third
+// they run anticlockwise, with the fourth clockwise.
+struct Hinge {
+  std::array<int, 4> particle{};
+  std::array<double, 4> slope{};  // of the angle by how far each leaves the flat shape, rad/m
+  double stiffness = 0;           // N m, per radian
+  double angle = 0;               // at rest, rad
+};
+
 // What a sheet of triangles resists strain and curvature by; empty: it does not.
 struct Surface {
   std::vector<MembraneElement> membrane = {};
   std::vector<CurvatureFit> fits = {};
+  std::vector<Hinge> hinges = {};
   std::vector<MembraneStiffness> stretch = {};  // of each panel
   std::vector<BendStiffness> bend = {};         // of each panel
   bool pushes = true;  // where it is shortened, as it pulls; needs no coupling

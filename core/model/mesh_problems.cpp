@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <set>
 #include <tuple>
 
@@ -29,6 +30,7 @@ class MeshCheck {
     check_flat();
     check_edges();
     check_used();
+    if (!mesh_.folds.empty()) check_folds();
     return std::move(problems_);
   }
 
@@ -174,6 +176,35 @@ class MeshCheck {
       else if (triangles[i] > kMostAtParticle)
         problem("triangles", "particle ", i, " is a corner of ", triangles[i], " triangles; ",
                 kMostAtParticle, " at most meet in one");
+  }
+
+  void check_folds() {
+    std::map<std::pair<int, int>, int> triangles;  // at each edge
+    for (const auto& triangle : mesh_.triangles)
+      for (std::size_t k = 0; k < 3; ++k)
+        ++triangles[std::minmax(triangle[k], triangle[(k + 1) % 3])];
+    std::map<std::pair<int, int>, std::size_t> taken;
+    for (std::size_t f = 0; f < mesh_.folds.size(); ++f) {
+      const auto& [particles, angle] = mesh_.folds[f];
+      const std::string at = join("folds[", f, "]");
+      if (!(std::abs(angle) <= kMostFold))
+        problem(at + ".angle_rad", angle, " rad is not within ", -kMostFold, " to ", kMostFold,
+                " rad");
+      if (particles.size() < 2)
+        problem(at + ".particles", "has ", particles.size(), " particles; a line has 2 or more");
+      for (std::size_t k = 0; k + 1 < particles.size(); ++k) {
+        const std::pair<int, int> edge = std::minmax(particles[k], particles[k + 1]);
+        const auto found = triangles.find(edge);
+        const int count = found == triangles.end() ? 0 : found->second;
+        if (count != 2)
+          problem(at + ".particles", particles[k], " and ", particles[k + 1],
+                  count == 0 ? " are not the ends of an edge"
+                             : " are the ends of an edge of one triangle; there is nothing to fold");
+        else if (const auto [other, added] = taken.emplace(edge, f); !added)
+          problem(at + ".particles", "the edge of ", particles[k], " and ", particles[k + 1],
+                  " is folded already, by folds[", other->second, "]");
+      }
+    }
   }
 
   const TriangleMesh& mesh_;

@@ -167,6 +167,10 @@ void check_triangles(const SheetDefinition& sheet, const std::string& field, Che
   if (raw && !std::holds_alternative<ChoiKo>(sheet.bending))
     check.problem(field + ".textile.raw",
                   "needs bending.choi_ko on triangles, or give measured values");
+  if (!std::get<Triangles>(sheet.shape)->folds.empty() &&
+      std::holds_alternative<ChoiKo>(sheet.bending))
+    check.problem(field + ".triangles.data.folds",
+                  "need ISOMETRIC bending; the sheet's is CHOI_KO, which knows no angles");
   for (const PanelTextile& each : sheet.panel_textiles) {
     const auto panel = static_cast<std::size_t>(each.panel);
     const std::string path = at(field + ".triangles.data.panels", panel) + ".textile";

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <variant>
@@ -31,6 +32,16 @@ struct Panel {
   double grain = 0;   // from the v axis of the flat shape to the warp, rad, anticlockwise
 };
 
+// A line along edges between two triangles that cloth is pressed along.
+struct Fold {
+  std::vector<int> particles;  // from one end to the other, or around to the first
+  // By how much one side is turned out of the plane of the other, rad: 0 flat; positive where the
+  // sides that normals point to come nearer.
+  double angle = 0;
+};
+
+inline constexpr double kMostFold = std::numbers::pi;  // rad
+
 // Triangles of any outline, and the flat shape that they were cut in.
 struct TriangleMesh {
   std::vector<Vector3d> start;                // of each particle, before the sheet is placed, m
@@ -38,6 +49,7 @@ struct TriangleMesh {
   std::vector<Vector2d> flat;                 // corners of the flat shape, u and v, m
   std::vector<std::array<int, 3>> flat_triangles;  // corners of each; empty: as `triangles`
   std::vector<Panel> panels;                       // runs of triangles, together all
+  std::vector<Fold> folds;
   // These follow, see complete().
   double spacing = 0;                // median edge of the flat shape, m
   Vector2d size = Vector2d::Zero();  // of the largest panel along warp and weft, m

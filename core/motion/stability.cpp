@@ -10,6 +10,7 @@
 
 #include "core/forces/curvature.h"
 #include "core/forces/elastic.h"
+#include "core/forces/hinges.h"
 #include "core/forces/membrane.h"
 #include "core/motion/surface_bound.h"
 
@@ -135,6 +136,12 @@ class SurfaceOperator {
         weights_.push_back({fit.particle[k],
                             Vector3d::Map(fit.weight[k].data()).cwiseProduct(root).cast<float>()});
     }
+    for (const Hinge& hinge : surface.hinges) {
+      const double root = std::sqrt(stiffness_bound(hinge));
+      fits_.push_back(static_cast<int>(hinge.particle.size()));
+      for (std::size_t k = 0; k < hinge.particle.size(); ++k)
+        weights_.push_back({hinge.particle[k], {static_cast<float>(root * hinge.slope[k]), 0, 0}});
+    }
   }
 
   // Precondition: stiffness > 0.
@@ -251,7 +258,7 @@ class SurfaceOperator {
   double air_rate_;
   double a_ = 1, b_ = 0;
   std::vector<Tangent> tangents_;
-  std::vector<int> fits_;  // particles of each
+  std::vector<int> fits_;  // particles of each, and of hinges
   std::vector<Weight> weights_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/forces/curvature.h"
+#include "core/forces/hinges.h"
 
 namespace weft {
 
@@ -59,6 +60,12 @@ SurfaceBound surface_bound(const Mesh& mesh, const VectorXd& strains) {
     for (std::size_t k = 0; k < fit.particle.size(); ++k)
       bound.bend[fit.particle[k]] +=
           row.dot(Vector3d(fit.weight[k][0], fit.weight[k][1], fit.weight[k][2]).cwiseAbs());
+  }
+  for (const Hinge& hinge : surface.hinges) {
+    double sum = 0;
+    for (const double slope : hinge.slope) sum += std::abs(slope);
+    for (std::size_t k = 0; k < hinge.particle.size(); ++k)
+      bound.bend[hinge.particle[k]] += stiffness_bound(hinge) * std::abs(hinge.slope[k]) * sum;
   }
   return bound;
 }

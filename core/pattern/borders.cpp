@@ -22,6 +22,7 @@ struct Piece {
   int count = -1;         // of lines; 0: a point
   int partner = -1;       // the piece that it is sewn to
   bool reversed = false;  // against it
+  double fold = 0;        // of the seam, rad
 };
 
 // A break of a side of a seam.
@@ -152,6 +153,7 @@ class Cutter {
                               places[k + 1].second);
       pieces_[as_index(a)].partner = b, pieces_[as_index(b)].partner = a;
       pieces_[as_index(a)].reversed = pieces_[as_index(b)].reversed = !seam.same_direction;
+      pieces_[as_index(a)].fold = seam.fold;
       links_.push_back(
           {pieces_[as_index(a)].panel, pieces_[as_index(b)].panel, seam.same_direction, field});
     }
@@ -386,6 +388,8 @@ class Cutter {
       if (piece.reversed) std::reverse(there.begin(), there.end());
       for (std::size_t i = 0; i < there.size(); ++i)
         borders_.sewn.push_back({{piece.panel, points[k][i]}, {other.panel, there[i]}});
+      if (piece.fold != 0 && piece.count > 0)
+        borders_.folds.push_back({piece.panel, points[k], piece.fold});
     }
   }
 

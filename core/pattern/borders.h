@@ -22,10 +22,18 @@ struct BorderPoint {
   bool operator==(const BorderPoint&) const = default;
 };
 
+// A line of a panel's border that its seam is pressed along.
+struct BorderFold {
+  int panel = 0;
+  std::vector<int> points;  // one after the other
+  double angle = 0;         // rad
+};
+
 // The borders of a pattern's panels, cut alike on both sides of every seam.
 struct Borders {
   std::vector<Border> panels;
   std::vector<std::pair<BorderPoint, BorderPoint>> sewn;  // points that are one
+  std::vector<BorderFold> folds;
   std::vector<bool> turned;                               // panels that seams turn over
   std::vector<Warning> notes;
   std::vector<Problem> problems;  // where there are any, the rest is void

@@ -217,7 +217,21 @@ class Builder {
       add_edges(p);
     }
     for (std::size_t i = 0; i < mesh.start.size(); ++i) mesh.start[i] /= shares[i];
+    for (const BorderFold& line : borders_.folds) add_fold(line);
     if (mesh.flat_triangles == mesh.triangles) mesh.flat_triangles.clear();
+  }
+
+  // One with that before it where it goes on from there.
+  void add_fold(const BorderFold& line) {
+    std::vector<Fold>& folds = garment_.mesh.folds;
+    std::vector<int> particles;
+    for (const int i : line.points) particles.push_back(particle_[as_index(line.panel)][as_index(i)]);
+    if (!folds.empty() && folds.back().angle == line.angle &&
+        folds.back().particles.back() == particles.front())
+      folds.back().particles.insert(folds.back().particles.end(), particles.begin() + 1,
+                                    particles.end());
+    else
+      folds.push_back({std::move(particles), line.angle});
   }
 
   void add_edges(std::size_t p) {

@@ -126,6 +126,7 @@ class PatternCheck {
     const std::string at = join(field_, ".seams[", s, "]");
     check_side(seam.first, at + ".first_side");
     check_side(seam.second, at + ".second_side");
+    number(at + ".fold_rad", seam.fold, -kMostFold, kMostFold, " rad");
   }
 
   void check_side(const std::vector<EdgeRun>& runs, const std::string& at) {

@@ -37,6 +37,7 @@ struct PatternSeam {
   std::vector<EdgeRun> first;
   std::vector<EdgeRun> second;  // in the same order, each against its outline
   bool same_direction = false;  // no: along it
+  double fold = 0;              // angle that it is pressed to, as Fold has it, rad
 };
 
 // Shares of an edge that are that close are the same.

@@ -3,7 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "core/forces/hinges.h"
 #include "core/forces/membrane.h"
 #include "core/triangles/rest_shape.h"
 #include "core/triangles/triangles.h"
@@ -58,6 +60,10 @@ void ease(const SheetDefinition& sheet, double share, Mesh& mesh) {
     double most = 1;
     for (const int i : fit.particle) most = std::max(most, longest[i]);
     fit.area *= std::pow(most, -4);
+  }
+  for (Hinge& hinge : mesh.surface.hinges) {
+    const double start = angle_of(hinge, x);
+    hinge.angle = start + share * std::remainder(hinge.angle - start, 2 * std::numbers::pi);
   }
 }
 

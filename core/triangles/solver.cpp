@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/forces/hinges.h"
 #include "core/motion/gaps.h"
 #include "core/motion/saved_values.h"
 #include "core/triangles/contact.h"
@@ -30,6 +31,7 @@ class TriangleSolver : public SheetSolver {
     law_.drags = dynamics.drag.size() > 0;
     if (wind) law_.wind = make_wind_law<T>(*wind);
     state_.prepare(law_);
+    if (!mesh.surface.hinges.empty()) find_hinged();
   }
 
   void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
@@ -62,6 +64,7 @@ class TriangleSolver : public SheetSolver {
       law_.air[axis] = static_cast<T>(speed * dt_);
       law_.wind.velocity[axis] = static_cast<T>(speed);
     }
+    if (!hinges_.empty()) turn_hinges();
     moved_ = sweep(law_, state_, bands(pool), pool);
   }
 
@@ -208,6 +211,26 @@ class TriangleSolver : public SheetSolver {
     }
   }
 
+  // Numbers the particles of hinges apart.
+  void find_hinged() {
+    state_.turn = AlignedArray<T>(state_.size());
+    hinges_ = mesh_.surface.hinges;
+    for (const Hinge& hinge : hinges_)
+      hinged_.insert(hinged_.end(), hinge.particle.begin(), hinge.particle.end());
+    std::sort(hinged_.begin(), hinged_.end());
+    hinged_.erase(std::unique(hinged_.begin(), hinged_.end()), hinged_.end());
+    for (Hinge& hinge : hinges_)
+      for (int& i : hinge.particle)
+        i = static_cast<int>(std::lower_bound(hinged_.begin(), hinged_.end(), i) - hinged_.begin());
+    hinged_x_.resize(3, static_cast<Eigen::Index>(hinged_.size()));
+  }
+  void turn_hinges() {
+    for (Eigen::Index k = 0; const int i : hinged_) hinged_x_.col(k++) = position_at(place(i));
+    hinged_force_.setZero(3, hinged_x_.cols());
+    add_hinge_forces(hinges_, hinged_x_, hinged_force_);
+    for (Eigen::Index k = 0; const int i : hinged_) put(state_.turn, i, hinged_force_.col(k++));
+  }
+
   // Where the values of a particle begin.
   std::size_t place(int particle) const {
     return 4 * static_cast<std::size_t>(law_.place[static_cast<std::size_t>(particle)]);
@@ -295,6 +318,9 @@ class TriangleSolver : public SheetSolver {
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
   double moved_ = 0;                    // farthest displacement of the last step, at most, m
   Gaps gaps_;                           // of blocks
+  std::vector<Hinge> hinges_;           // by numbers in hinged_
+  std::vector<int> hinged_;             // particles
+  Matrix3Xd hinged_x_, hinged_force_;   // of these, m and N
   double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
   bool measures_ = false;               // pushed_
   std::vector<double> pushes_;          // the same of each block when last looked at, m

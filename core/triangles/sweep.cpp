@@ -297,6 +297,11 @@ void move_patch(const TriangleLaw<T>& law, TriangleState<T>& state,
   for (std::size_t k = 0; k < static_cast<std::size_t>(patch.blocks); ++k) {
     const std::size_t block = static_cast<std::size_t>(patch.block) + k;
     gather_block<kBends, kDamps, kBlows>(law, copy, block, k, next, force);
+    if (state.turn.size() > 0) {
+      const T* const turn = state.turn.data() + block * 4 * TriangleLaw<T>::kBlock;
+      for (std::size_t i = 0; i < 4 * TriangleLaw<T>::kBlock; i += hn::Lanes(d))
+        hn::Store(hn::Add(hn::Load(d, force + i), hn::Load(d, turn + i)), d, force + i);
+    }
     move_block(d, law, state, block, force, hn::Load(d, drift), hn::Load(d, air), largest);
   }
   hn::Store(largest, d, reached);

@@ -19,6 +19,8 @@ struct TriangleState {
   AlignedArray<T> x_error;  // what rounding has added to x, m; with compensation only, as the next
   AlignedArray<T> d_error;  // what rounding has added to d, m
 
+  AlignedArray<T> turn;  // forces of hinges in this step, N; or empty
+
   // What follows from mass, drag and the step.
   AlignedArray<T> step2;  // dt^2 / mass, s^2/kg; 0 holds a particle
   AlignedArray<T> drag;   // c dt / m; or empty

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "core/triangles/connections.h"
-#include "core/triangles/fit.h"
+#include "core/triangles/folds.h"
 #include "core/triangles/rest_shape.h"
 
 namespace weft {
@@ -73,7 +73,11 @@ Mesh make_triangles(const SheetDefinition& sheet) {
   }
   // what pulls at nothing is not there
   if (stretches) surface.membrane = make_membrane(shape);
-  if (bends) surface.fits = fit_curvature(shape);
+  if (bends) {
+    const std::vector<Fold>& folds = triangles_in(sheet).folds;
+    surface.fits = fit_curvature(shape, folds);
+    surface.hinges = make_hinges(shape, folds, surface.bend);
+  }
   if (mesh.damping > 0) {
     Family& family = mesh.families.emplace_back(Family{FamilyKind::kDamp, 0, 0, {}, {}});
     for (const auto& [i, j] : edges(shape)) family.connections.add(i, j);

@@ -21,7 +21,8 @@ class PatternReader {
       pattern.panels.push_back(panel(from.panels(p), join("pattern.panels[", p, "]")));
     for (const v1::PatternSeam& seam : from.seams())
       pattern.seams.push_back(
-          {runs(seam.first_side()), runs(seam.second_side()), seam.same_direction()});
+          {runs(seam.first_side()), runs(seam.second_side()), seam.same_direction(),
+           seam.fold_rad()});
     return pattern;
   }
 

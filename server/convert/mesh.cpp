@@ -205,6 +205,8 @@ Converted<Triangles> to_mesh(const v1::MeshData& from, const std::string& field)
   mesh.flat_triangles = triangles_of(from.flat_triangles());
   for (const v1::Panel& panel : from.panels())
     mesh.panels.push_back({panel.name(), panel.triangle_count(), panel.grain_rad()});
+  for (const v1::Fold& fold : from.folds())
+    mesh.folds.push_back({{fold.particles().begin(), fold.particles().end()}, fold.angle_rad()});
   Triangles made = complete(std::move(mesh));
   problems = find_problems(*made, field);
   if (problems.empty()) return made;
@@ -276,6 +278,11 @@ v1::MeshData topology_of(const SheetShape& shape) {
 v1::MeshData to_proto(const Triangles& mesh) {
   v1::MeshData to = topology_of(mesh);
   to.set_positions_m(planes_of(mesh->start));
+  for (const Fold& fold : mesh->folds) {
+    v1::Fold* added = to.add_folds();
+    added->mutable_particles()->Assign(fold.particles.begin(), fold.particles.end());
+    added->set_angle_rad(fold.angle);
+  }
   return to;
 }
 

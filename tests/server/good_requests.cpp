@@ -54,6 +54,10 @@ v1::MeshData full_mesh(const v1::Textile& textile) {
   panel->set_triangle_count(8);
   panel->set_grain_rad(0.1);
   *panel->mutable_textile() = textile;
+  v1::Fold* fold = mesh.add_folds();
+  fold->mutable_particles()->Add(1);
+  fold->mutable_particles()->Add(4);
+  fold->set_angle_rad(-0.5);
   return mesh;
 }
 
@@ -230,7 +234,8 @@ std::vector<std::string> known_requests(const std::string& type) {
        "panels { name: 'back' edges { points_m: [0.2, 0] } edges { points_m: [0.2, 0.3] } "
        "edges { points_m: [0, 0.3] } edges { points_m: [0, 0] } textile { preset: 'denim_11oz' } } "
        "seams { first_side { panel: 'front' edge: 3 begin: 0.1 end: 0.9 } "
-       "second_side { panel: 'back' edge: 1 begin: 0.2 end: 0.9 } } } edge_m: 0.05"},
+       "second_side { panel: 'back' edge: 1 begin: 0.2 end: 0.9 } fold_rad: -0.5 } } "
+       "edge_m: 0.05"},
   };
   std::vector<std::string> texts;
   const auto [first, last] = known.equal_range(type);

@@ -20,6 +20,7 @@ from .scene import (
     Dressing,
     EdgeRun,
     Environment,
+    Fold,
     Grab,
     Grid,
     Hold,
@@ -53,11 +54,11 @@ from .scene import (
 
 __all__ = [
     "BendingLaw", "BodyMesh", "Box", "Capsule", "ChoiKo", "Collider", "Damaged", "Drag",
-    "Drape", "Dressing", "EdgeRun", "Environment", "Error", "Frame", "Grab", "Grid", "Hand", "Hold",
-    "InvalidArgument", "Isometric", "Keyframe", "MeasuredTextile", "MeshData", "MoveCollider",
-    "NoConnection", "NotFound", "Panel", "Pattern", "PatternEdge", "PatternPanel", "PatternSeam",
-    "Pin", "PinParticle", "Placement", "Plane", "Poses", "RawTextile", "Recording", "Relax",
-    "Release", "Scene", "Server", "Session", "Sheet", "SolverSettings", "Sphere", "Textile",
-    "TriangleSheet", "UnpinParticle", "Violation", "Wind", "aio", "connect", "errors", "open",
-    "serve", "v1",
+    "Drape", "Dressing", "EdgeRun", "Environment", "Error", "Fold", "Frame", "Grab", "Grid",
+    "Hand", "Hold", "InvalidArgument", "Isometric", "Keyframe", "MeasuredTextile", "MeshData",
+    "MoveCollider", "NoConnection", "NotFound", "Panel", "Pattern", "PatternEdge",
+    "PatternPanel", "PatternSeam", "Pin", "PinParticle", "Placement", "Plane", "Poses",
+    "RawTextile", "Recording", "Relax", "Release", "Scene", "Server", "Session", "Sheet",
+    "SolverSettings", "Sphere", "Textile", "TriangleSheet", "UnpinParticle", "Violation",
+    "Wind", "aio", "connect", "errors", "open", "serve", "v1",
 ]

@@ -102,6 +102,15 @@ class Panel(Value):
 
 
 @dataclass(eq=False)
+class Fold(Value):
+    """A line of edges that keeps an angle."""
+
+    message = mesh_pb2.Fold
+    particles: Sequence[int]
+    angle_rad: float
+
+
+@dataclass(eq=False)
 class Poses(Value):
     """A body in motion: its vertices at given times, on straight ways between.
 
@@ -136,6 +145,7 @@ class MeshData(Value):
     flat_m          (k, 2) the flat shape, m: along the weft (u) and the warp (v)
     flat_triangles  (m, 3) corners of the flat shape; None: as triangles
     panels          runs of triangles; none: one panel
+    folds           lines that a sheet is pressed along
     poses           how a body moves; None: it keeps its shape
     """
 
@@ -145,6 +155,7 @@ class MeshData(Value):
     flat_m: npt.ArrayLike | None = None
     flat_triangles: npt.ArrayLike | None = None
     panels: Sequence[Panel] = ()
+    folds: Sequence[Fold] = ()
     poses: Poses | None = None
 
     def to_proto(self, path: str = "") -> Any:
@@ -157,6 +168,7 @@ class MeshData(Value):
         if self.flat_triangles is not None:
             to.flat_triangles = row_bytes(self.flat_triangles, 3, "<u4", at + "flat_triangles")
         to.panels.extend(each.to_proto(f"{at}panels[{i}]") for i, each in enumerate(self.panels))
+        to.folds.extend(each.to_proto(f"{at}folds[{i}]") for i, each in enumerate(self.folds))
         if self.poses is not None:
             to.poses.CopyFrom(self.poses.to_proto(at + "poses"))
         return to
@@ -176,6 +188,7 @@ class MeshData(Value):
             flat_m=columns(message.flat_m, 2),
             flat_triangles=None if flat_triangles is None else flat_triangles.reshape(-1, 3),
             panels=[Panel.from_proto(each) for each in message.panels],
+            folds=[Fold.from_proto(each) for each in message.folds],
             poses=Poses.from_proto(message.poses) if message.HasField("poses") else None,
         )
 
@@ -549,6 +562,7 @@ class PatternSeam(Value):
     first_side: Sequence[EdgeRun]
     second_side: Sequence[EdgeRun]
     same_direction: bool = False
+    fold_rad: float = 0
 
 
 @dataclass(eq=False)

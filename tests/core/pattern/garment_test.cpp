@@ -200,6 +200,17 @@ TEST(Garments, SidesOfSeamsHaveEqualCountsHoweverTheyAreDivided) {
   EXPECT_EQ(euler_number(garment.mesh), 1 - 2 + 2 - 1 + 1);
 }
 
+TEST(Garments, ASeamPressedToAnAngleIsOneFoldAlongAllItsPanels) {
+  Pattern pattern{{rectangle("band", 0.5, 0.04), rectangle("left", 0.2, 0.3),
+                   rectangle("right", 0.3, 0.3)},
+                  {{{{"band", 0}}, {{"left", 2}, {"right", 2}}, false, -2.5},
+                   seam({"left", 1}, {"right", 3})}};
+  const Garment garment = built(pattern, 0.01);
+  ASSERT_EQ(garment.mesh.folds.size(), 1);
+  EXPECT_EQ(garment.mesh.folds[0].particles, garment.edges[0].particles);
+  EXPECT_EQ(garment.mesh.folds[0].angle, -2.5);
+}
+
 TEST(Garments, AGatherSharesItsFullnessEvenly) {
   Pattern pattern{{rectangle("full", 0.4, 0.1), rectangle("plain", 0.2, 0.1)},
                   {seam({"full", 2}, {"plain", 0})}};
@@ -465,6 +476,8 @@ TEST(Garments, WhatCannotBeCutOrSewnIsRefusedByItsField) {
           {{good}, {seam({"front", 1}, {"front", 3}), seam({"front", 0}, {"front", 1, 0.5, 1})}}),
       "pattern.seams[1].second_side[0]");
   EXPECT_EQ(field_of({{good}, {{{}, {{"front", 1}}}}}), "pattern.seams[0].first_side");
+  EXPECT_EQ(field_of({{good}, {{{{"front", 1}}, {{"front", 3}}, false, 3.2}}}),
+            "pattern.seams[0].fold_rad");
   EXPECT_EQ(field_of({{panel("line", {line_to(1, 0)})}, {}}), "pattern.panels[0].edges");
   PatternPanel bad = good;
   bad.edges[2].points[0].x() = std::nan("");

@@ -188,5 +188,28 @@ TEST(SewnDrape, AGatherOfTwoToOneFallsEvenly) {
   EXPECT_EQ(simulation.verdict().cloth_cuts, 0);
 }
 
+// A tube around a pole with a cuff on top, which is pressed to lie outside on outside, and so does.
+TEST(SewnDrape, ACuffTurnsDownAlongItsPressedSeam) {
+  constexpr double kSeam = 0.2;
+  Pattern pattern;
+  add_both(pattern, trapezoid_panel("tube", 0, 0.34, kSeam, 0.34), 0.13);
+  add_both(pattern, trapezoid_panel("cuff", kSeam, 0.34, 0.05, 0.35), 0.13);
+  for (const char* side : {"-front", "-back"})
+    pattern.seams.push_back(
+        {{{std::string("tube") + side, 2}}, {{std::string("cuff") + side, 0}}, false, 2.8});
+  const Garment garment = sewn(pattern, 0.02);
+  Scene scene = on_a_pole(garment);
+  scene.dressing->holds = {{0, garment.edges[2].particles, 10}};
+  Simulation simulation(scene);
+  for (int frame = 0; frame < 150; ++frame) ASSERT_TRUE(simulation.advance_frame());
+  const Matrix3Xd x = positions(simulation);
+  for (const GarmentEdge& edge : garment.edges) {
+    if (!pattern.panels[static_cast<std::size_t>(edge.panel)].name.starts_with("cuff")) continue;
+    if (edge.edge != 2) continue;
+    for (const int i : edge.particles) EXPECT_LT(x(1, i), kSeam - 0.02) << i;
+  }
+  EXPECT_EQ(simulation.stats().cloth_cuts, 0);
+}
+
 }  // namespace
 }  // namespace weft::testing

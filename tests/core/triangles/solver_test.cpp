@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <memory>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -150,6 +152,19 @@ const Feature kFeatures[] = {
     {"Drag", [](SheetDefinition& s) { measured(s).air_drag = 0.1; }},
     {"ShortenedAtNoCost",
      [](SheetDefinition& s) { s.bending = Isometric{.resist_compression = false}; }},
+    {"Folds",
+     [](SheetDefinition& s) {
+       TriangleMesh mesh = triangles_in(s);
+       std::map<std::pair<int, int>, int> seen;
+       for (const auto& triangle : mesh.triangles)
+         for (std::size_t k = 0; k < 3; ++k)
+           ++seen[std::minmax(triangle[k], triangle[(k + 1) % 3])];
+       double angle = -3;
+       for (const auto& [edge, triangles] : seen)
+         if (triangles == 2 && (edge.first + edge.second) % 3 == 0)
+           mesh.folds.push_back({{edge.first, edge.second}, angle = angle > 2.5 ? -3 : angle + 0.7});
+       s.shape = std::make_shared<const TriangleMesh>(mesh);
+     }},
     {"PanelsOfTheirOwnTextile",
      [](SheetDefinition& s) {
        MeasuredTextile stiff = wool();

@@ -5,17 +5,23 @@
 #include <cmath>
 #include <ctime>
 #include <iostream>
+#include <numbers>
 #include <numeric>
 
 #include "core/simulation.h"
 #include "tests/reports/blender.h"
 #include "tests/reports/contact_scenes.h"
+#include "tests/reports/picture.h"
 #include "tests/reports/report.h"
+#include "tests/support/core/bodies.h"
+#include "tests/support/core/scenes.h"
 
 namespace weft::reports {
 namespace {
 
 using Cells = std::vector<std::string>;
+
+constexpr double kBall = 0.15;  // radius of those in scenes, m
 
 double processor_time() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -83,7 +89,7 @@ struct Watched {
   double longest() const { return std::ranges::max(frames); }
 };
 
-Watched watch(const ContactScene& each) {
+Watched watch(const ContactScene& each, const std::filesystem::path& picture) {
   Simulation simulation(each.scene);
   Watched watched;
   while (simulation.time() < each.seconds) {
@@ -91,6 +97,8 @@ Watched watch(const ContactScene& each) {
     if (!simulation.advance_frame()) break;
     watched.frames.push_back(processor_time() - begin);
     watched.cuts.push_back(*simulation.stats().cloth_cuts);
+    if (simulation.frame() == std::lround(each.shown / each.scene.solver.frame_step))
+      draw(simulation, picture);
   }
   watched.repairs = std::to_string(simulation.repairs().size()) + simulation.failure();
   return watched;
@@ -104,9 +112,11 @@ Cells cells_of(const std::vector<std::int64_t>& cuts) {
 
 void cuts(Page& page, bool large) {
   const auto blender = blender_version();
+  page.text("## What passes through");
   std::vector<Cells> rows, beside;
   for (const ContactScene& each : contact_scenes(large)) {
-    const Watched ours = watch(each);
+    const Watched ours =
+        watch(each, page.picture(each.name, fmt::format("{}, after {} s", each.says, each.shown)));
     const Cells found = cells_of(ours.cuts);
     int particles = 0;
     for (const SheetDefinition& sheet : each.scene.sheets) particles += sheet.particle_count();
@@ -127,7 +137,6 @@ void cuts(Page& page, bool large) {
               number(std::ranges::max(theirs.frames))});
     std::cerr << fmt::format("{}\n", fmt::join(beside.back(), ", "));
   }
-  page.text("## What passes through");
   page.text(
       "Edges that pass through triangles, counted exactly at the end of every frame, without those "
       "that share a particle.");
@@ -145,6 +154,64 @@ void cuts(Page& page, bool large) {
              beside);
 }
 
+// How far what lies on a ball is from where the exact sphere would hold it.
+void ball_error(Page& page) {
+  Scene scene = draped(31);
+  scene.sheets[0].textile.damping_ratio = 0.1;
+  const double skin = scene.sheets[0].skin_or_default();
+  const Scene beside = [&] {
+    Scene exact = scene;
+    exact.colliders[0].shape = Sphere{Vector3d::Zero(), kBall};
+    return exact;
+  }();
+  std::vector<Cells> rows;
+  for (const auto& [says, each] : {std::pair("5 120 triangles", scene), {"the sphere", beside}}) {
+    Simulation simulation(each);
+    while (simulation.time() < 8 && !simulation.at_rest())
+      if (!simulation.advance_frame()) throw std::runtime_error(simulation.failure());
+    const VectorXd pressures = simulation.pressures(0);
+    const Matrix3Xd x = testing::positions(simulation);
+    double most = 0;
+    int touching = 0;
+    for (Eigen::Index i = 0; i < x.cols(); ++i) {
+      if (pressures[i] <= 0) continue;
+      ++touching;
+      most = std::max(most, std::abs(x.col(i).norm() - kBall - skin));
+    }
+    rows.push_back({says, simulation.at_rest() ? fmt::format("{:.2f}", simulation.time()) : "-",
+                    std::to_string(touching), fmt::format("{:.3f}", 1e3 * most)});
+    page.row({"ball", says, number(simulation.time()), std::to_string(touching), number(most)});
+  }
+  page.text(
+      "Wool of 0.3 m at rest on a ball of 0.15 m: the farthest that a particle which presses on it "
+      "is from where the sphere holds it.");
+  page.table({"given as", "at rest after, s", "particles that press", "farthest, mm"}, rows);
+}
+
+// The angle from which on a patch slides down an incline of triangles.
+void friction_angle(Page& page) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  std::vector<Cells> rows;
+  for (const double friction : {0.1, 0.3, 0.6, 1.0}) {
+    const double exact = std::atan(friction);
+    double holds = exact - kDegree, slides = exact + kDegree;
+    while (slides - holds > 0.005 * kDegree) {
+      const double angle = (holds + slides) / 2;
+      const Quaterniond turn(Eigen::AngleAxisd(-angle, Vector3d::UnitZ()));
+      const Collider incline =
+          testing::solid(testing::box_mesh({0.5, 0.1, 0.1}, turn), friction);
+      constexpr double kSlides = 2e-5;  // m in 0.4 s: at 0.002 degrees more
+      (testing::slide_on(incline, turn, {0.013, 0.101, 0.007}, 0.4) > kSlides ? slides : holds) =
+          angle;
+    }
+    rows.push_back({fmt::format("{}", friction), fmt::format("{:.3f}", exact / kDegree),
+                    fmt::format("{:.3f}", slides / kDegree)});
+    page.row({"friction", rows.back()[0], number(exact), number(slides)});
+  }
+  page.text("An incline of triangles: where a patch begins to slide, beside atan(mu).");
+  page.table({"mu", "atan(mu), degrees", "slides from, degrees"}, rows);
+}
+
 }  // namespace
 
 void contact(const std::filesystem::path& folder, const std::string& commit, bool large) {
@@ -152,6 +219,9 @@ void contact(const std::filesystem::path& folder, const std::string& commit, boo
   page.text("# Contact");
   page.text(fmt::format("Made by `./dev bench contact` on {}.", machine(commit)));
   costs(page, large);
+  page.text("## Against what is exact");
+  ball_error(page);
+  friction_angle(page);
   cuts(page, large);
   page.write();
 }

@@ -240,16 +240,16 @@ Scene stacked(int n) {
 std::vector<ContactScene> contact_scenes(bool large) {
   const int n = large ? 51 : 31;
   const double turns = large ? 4 : 2;
-  return {{"heap", "a sheet is poured into a heap", poured(large ? 0.5 : 0.3), 1.5},
+  return {{"heap", "a sheet is poured into a heap", poured(large ? 0.5 : 0.3), 1.5, 1.5},
           {"twist",
            large ? "a tube is twisted by four turns in 4 s and back"
                  : "a tube is twisted by two turns in 2 s and back",
-           twisted_tube(turns, 2 * turns), 2 * turns + 0.2},
-          {"knot", "a ribbon along a knot is pulled", knotted(), 2.5},
-          {"cloth pulled", "a cloth is drawn from under three napkins", drawn_away(), 1.2},
-          {"layers", "two layers on a ball that moves", two_layers(n), 3},
-          {"ball", "a sheet falls onto a ball", draped(2 * n - 1), 1},
-          {"stack", "ten sheets fall onto a ball", stacked(n), 1}};
+           twisted_tube(turns, 2 * turns), 2 * turns + 0.2, turns},
+          {"knot", "a ribbon along a knot is pulled", knotted(), 2.5, 2.5},
+          {"cloth-pulled", "a cloth is drawn from under three napkins", drawn_away(), 1.2, 0.6},
+          {"layers", "two layers on a ball that moves", two_layers(n), 3, 3},
+          {"ball", "a sheet falls onto a ball", draped(2 * n - 1), 1, 1},
+          {"stack", "ten sheets fall onto a ball", stacked(n), 1, 1}};
 }
 
 }  // namespace weft::reports

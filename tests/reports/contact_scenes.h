@@ -12,6 +12,7 @@ struct ContactScene {
   std::string name, says;
   Scene scene;
   double seconds = 0;
+  double shown = 0;  // when its picture is taken, s
 };
 
 // A sheet of n x n particles that hangs from two corners and touches nothing; as triangles, or as a

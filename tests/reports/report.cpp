@@ -46,6 +46,11 @@ void Page::plot(const std::string& name, const Plot& plot) {
   markdown_ += fmt::format("![{}]({}.svg)\n\n", plot.title, name);
 }
 
+std::filesystem::path Page::picture(const std::string& name, const std::string& title) {
+  markdown_ += fmt::format("![{}]({}.webp)\n\n", title, name);
+  return folder_ / (name + ".webp");
+}
+
 void Page::write() const {
   write_file(folder_ / (folder_.filename().string() + ".csv"), csv_);
   write_file(folder_ / "README.md", markdown_);

@@ -22,6 +22,8 @@ class Page {
   void table(const std::vector<std::string>& columns,
              const std::vector<std::vector<std::string>>& rows);
   void plot(const std::string& name, const Plot& plot);
+  // Where the caller writes a picture, NAME.webp.
+  std::filesystem::path picture(const std::string& name, const std::string& title);
   // Writes NAME.csv and README.md.
   void write() const;
 

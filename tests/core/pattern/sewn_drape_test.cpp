@@ -188,27 +188,36 @@ TEST(SewnDrape, AGatherOfTwoToOneFallsEvenly) {
   EXPECT_EQ(simulation.verdict().cloth_cuts, 0);
 }
 
-// A tube around a pole with a cuff on top, which is pressed to lie outside on outside, and so does.
-TEST(SewnDrape, ACuffTurnsDownAlongItsPressedSeam) {
-  constexpr double kSeam = 0.2;
-  Pattern pattern;
-  add_both(pattern, trapezoid_panel("tube", 0, 0.34, kSeam, 0.34), 0.13);
-  add_both(pattern, trapezoid_panel("cuff", kSeam, 0.34, 0.05, 0.35), 0.13);
-  for (const char* side : {"-front", "-back"})
-    pattern.seams.push_back(
-        {{{std::string("tube") + side, 2}}, {{std::string("cuff") + side, 0}}, false, 2.8});
-  const Garment garment = sewn(pattern, 0.02);
-  Scene scene = on_a_pole(garment);
-  scene.dressing->holds = {{0, garment.edges[2].particles, 10}};
-  Simulation simulation(scene);
-  for (int frame = 0; frame < 150; ++frame) ASSERT_TRUE(simulation.advance_frame());
-  const Matrix3Xd x = positions(simulation);
-  for (const GarmentEdge& edge : garment.edges) {
-    if (!pattern.panels[static_cast<std::size_t>(edge.panel)].name.starts_with("cuff")) continue;
-    if (edge.edge != 2) continue;
-    for (const int i : edge.particles) EXPECT_LT(x(1, i), kSeam - 0.02) << i;
-  }
-  EXPECT_EQ(simulation.stats().cloth_cuts, 0);
+// Placed flat, outside to +z, or turned down in front already; no weight.
+TEST(SewnDrape, APressedSeamTurnsAPanelToItsAngleOnTheSideThatIsMeant) {
+  constexpr double kWidth = 0.1, kSeam = 0.12, kFlap = 0.06;
+  for (const bool down : {false, true})
+    for (const double angle : {-pi / 2, 2.0}) {
+      PatternPanel flap = trapezoid_panel("flap", kSeam, kWidth, kFlap, kWidth);
+      if (down) {
+        flap.origin = {0, 2 * kSeam, angle > 0 ? 0.03 : -0.03};
+        flap.rotation = Eigen::AngleAxisd(pi, Vector3d::UnitX());
+      }
+      const Garment garment =
+          sewn({{trapezoid_panel("base", 0, kWidth, kSeam, kWidth), flap},
+                {{{{"base", 2}}, {{"flap", 0}}, false, angle}}},
+               0.02);
+      Scene scene;
+      scene.sheets = {cloth_of(garment, 1e-5)};
+      for (const int i : garment.edges[0].particles) scene.sheets[0].pins.push_back({{i}, {}});
+      scene.environment.gravity.setZero();
+      scene.dressing.emplace();
+      Simulation simulation(scene);
+      for (int frame = 0; frame < 240; ++frame) ASSERT_TRUE(simulation.advance_frame());
+      const Matrix3Xd x = positions(simulation);
+      const auto middle = [&](std::size_t edge) {
+        Vector3d sum = Vector3d::Zero();
+        for (const int i : garment.edges[edge].particles) sum += x.col(i);
+        return Vector3d(sum / static_cast<double>(garment.edges[edge].particles.size()));
+      };
+      const Vector3d up = (middle(2) - middle(0)).normalized(), way = middle(6) - middle(2);
+      EXPECT_NEAR(std::atan2(way.dot(Vector3d::UnitX().cross(up)), way.dot(up)), angle, 0.1) << down;
+    }
 }
 
 }  // namespace

@@ -20,7 +20,11 @@ void MovingSheet::set_definition(const Scene& scene, const SheetDefinition& defi
 
 void MovingSheet::set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made) {
   mesh = std::move(made);
-  if (dressing.ease < 1) ease_rest_shape(definition, dressing.ease, mesh);
+  flat_ = {};
+  if (dressing.ease < 1) {
+    flat_ = mesh.surface;
+    ease_rest_shape(definition, dressing.ease, mesh);
+  }
   if (!scene.environment.wind) mesh.triangles = std::vector<std::array<int, 3>>();
   skin = definition.skin_or_default();
   set_pins(definition);
@@ -46,16 +50,21 @@ void MovingSheet::dress(const Scene& scene, const SheetDefinition& definition,
                         const DressingState& state) {
   const bool keeps_shape = state.ease == dressing.ease;
   dressing = state;
-  if (keeps_shape)
-    set_air_and_weight(scene);
-  else
-    remake_mesh(scene, definition);
+  if (!keeps_shape && flat_.membrane.empty()) return remake_mesh(scene, definition);
+  if (!keeps_shape && state.ease < 1) {
+    mesh.surface = flat_;
+    ease_rest_shape(definition, state.ease, mesh);
+  } else if (!keeps_shape) {
+    mesh.surface = std::exchange(flat_, {});
+  }
+  set_air_and_weight(scene);
 }
 
 void MovingSheet::release_memory() {
   good_ = {};
   const double damping = mesh.damping;
   mesh = {};
+  flat_ = {};
   mesh.damping = damping;
   dynamics.inverse_mass = dynamics.drag = VectorXd();
   dynamics.tethers = {};

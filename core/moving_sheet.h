@@ -60,6 +60,7 @@ struct MovingSheet {
   void set_mesh(const Scene& scene, const SheetDefinition& definition, Mesh made);
   void set_air_and_weight(const Scene& scene);
 
+  Surface flat_;             // of the mesh, until its rest shape is the flat one; or empty
   mutable SheetState good_;  // empty: not looked at since
 };
 

@@ -104,6 +104,8 @@ void PairLists::look(const Places& now, double come) {
              rounding;
     lasts_ = std::min(lasts_, left);
   }
+  // what was not looked at may be nearer still
+  if (lasts_ < come) lasts_ = 0;
 }
 
 // Of a list without any that are near: how far its pairs may come at x until some are, m. `left`:

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "core/cloth_contact/block_motion.h"
+#include "core/cloth_contact/pair_lists.h"
 #include "core/cloth_contact/pairs.h"
 #include "core/contact/nearest.h"
 #include "core/triangles/cut.h"
@@ -180,6 +181,42 @@ TEST(NearBlocks, KnowsNoTwoNodesToBeFartherApartThanTheyAre) {
     }
     EXPECT_GT(flat, 20);
   }
+}
+
+TEST(PairLists, TellNoLongerWayThanSheetsHaveUntilTheyAreNear) {
+  constexpr double kApart = 0.006, kWay = 0.001, kCome = 0.003;  // m
+  constexpr Eigen::Index kMoving = 5;
+  std::vector<SheetDefinition> sheets(24, flat_sheet(5, 5, 0.01));
+  std::vector<Matrix3Xd> from;
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    sheets[s].origin = {0, kApart * static_cast<double>(s), 0};
+    from.push_back(start_positions(sheets[s]));
+  }
+  const Cloth cloth(sheets);
+  int may_come = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    SCOPED_TRACE(seed);
+    PairLists lists(cloth);
+    lists.expect(cloth.positions(from), 1e-4);
+    ASSERT_TRUE(lists.empty());
+    // some move, each as a whole
+    Matrix3Xd way = kWay * noise(static_cast<int>(sheets.size()), seed);
+    way.rightCols(way.cols() - kMoving).setZero();
+    std::vector<Matrix3Xd> x;
+    for (std::size_t s = 0; s < sheets.size(); ++s)
+      x.emplace_back(from[s].colwise() + way.col(static_cast<Eigen::Index>(s)));
+    double least = kApart;
+    for (std::size_t s = 1; s < sheets.size(); ++s)
+      least = std::min(least, x[s](1, 0) - x[s - 1](1, 0));
+    const Matrix3Xd all = cloth.positions(x);
+    Places about = Places::Zero(4, all.cols());
+    about.topRows<3>() = all.cast<float>();
+    lists.look(about, kCome);
+    EXPECT_LE(lists.lasts(), std::max(least - cloth.thickest, 0.0));
+    may_come += lists.lasts() >= kCome ? 1 : 0;
+  }
+  EXPECT_GT(may_come, 3);
+  EXPECT_LT(may_come, 97);
 }
 
 }  // namespace

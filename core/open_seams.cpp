@@ -58,7 +58,7 @@ LeftOut through_cloth_at_start(const Scene& scene, const LeftOut& open) {
         ring[static_cast<std::size_t>(particle)].push_back(t);
     through.emplace_back(triangles.back().size());
   }
-  const auto note = [&](std::size_t s, const auto& particles) {
+  const auto note = [&](std::size_t s, const auto& particles, bool within) {
     if (open[s].empty()) return;
     std::vector<std::size_t> having = around[s][static_cast<std::size_t>(particles[0])];
     std::erase_if(having, [&](std::size_t t) {
@@ -67,11 +67,13 @@ LeftOut through_cloth_at_start(const Scene& scene, const LeftOut& open) {
       });
     });
     if (!std::ranges::all_of(having, [&](std::size_t t) { return open[s][t]; })) return;
+    if (within) through[s] = open[s];
     for (const std::size_t t : having) through[s][t] = true;
   };
   for (const ClothCut& cut : count_cuts(scene.sheets, x, kAll).first) {
-    note(cut.edge_sheet, cut.edge);
-    note(cut.triangle_sheet, cut.triangle);
+    const bool within = cut.edge_sheet == cut.triangle_sheet;
+    note(cut.edge_sheet, cut.edge, within);
+    note(cut.triangle_sheet, cut.triangle, within);
   }
   return through;
 }

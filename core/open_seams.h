@@ -9,8 +9,8 @@
 
 namespace weft {
 
-// Of triangles at open seams, those that start through cloth, or that cloth starts through: contact
-// would keep them there.
+// Of triangles at open seams, those that start through another sheet, or that it starts through; of
+// a sheet where one starts so through the sheet itself, all: cloth contact would keep them there.
 LeftOut through_cloth_at_start(const Scene& scene, const LeftOut& open);
 
 // Edges that reach from panel to panel while a seam closes. Colliders push particles, and such an

@@ -6,9 +6,6 @@
 
 #include "core/cloth_contact/cuts.h"
 #include "core/forces/elastic.h"
-#include "core/open_seams.h"
-#include "core/pattern/garment.h"
-#include "core/sheet_factory.h"
 #include "core/simulation.h"
 #include "core/triangles/ease.h"
 #include "core/triangles/triangles.h"
@@ -314,42 +311,6 @@ TEST(Dressing, WhatReachesFromPanelToPanelIsNotDrawnThroughCloth) {
     ASSERT_EQ(cuts_of(simulation), 0) << "frame " << frame;
     dress(simulation, 1);
   }
-}
-
-TEST(Dressing, OnlyTrianglesThatStartThroughClothMeetNone) {
-  // front and back of a tube that is open by 0.2 m on both sides, and a flap across one of them
-  const auto rectangle = [](const char* name, double width, double height, const Vector3d& origin) {
-    PatternPanel panel{.name = name, .edges = {}, .origin = origin};
-    for (const Vector2d& end :
-         {Vector2d(width, 0), Vector2d(width, height), Vector2d(0, height), Vector2d(0, 0)})
-      panel.edges.push_back({.points = {end}});
-    return panel;
-  };
-  Pattern pattern{
-      {rectangle("front", 0.2, 0.3, {0, 0, 0.1}), rectangle("back", 0.2, 0.3, {0.2, 0, -0.1}),
-       rectangle("flap", 0.1, 0.1, {0.15, 0.1, 0.05})},
-      {{{{"front", 1}}, {{"back", 3}}}, {{{"front", 3}}, {{"back", 1}}}}};
-  pattern.panels[1].rotation = Eigen::AngleAxisd(M_PI, Vector3d::UnitY());
-  Scene scene = around_pole(0.01);
-  scene.sheets[0].shape =
-      complete(std::get<Garment>(build_garment(pattern, 0.02, "pattern", "edge_m")).mesh);
-  const SheetDefinition& sheet = scene.sheets[0];
-  const LeftOut open{triangles_at_open_seams(sheet)};
-  const LeftOut through = through_cloth_at_start(scene, open);
-  const auto triangles = triangles_of(sheet.shape);
-  const Matrix3Xd start = start_positions(sheet);
-  int left_out = 0, open_on_other_side = 0;
-  for (std::size_t t = 0; t < triangles.size(); ++t) {
-    const double x = start.col(triangles[t][0]).x(), y = start.col(triangles[t][0]).y();
-    if (open[0][t] && x < 0.1) ++open_on_other_side;
-    if (!through[0][t]) continue;
-    ++left_out;
-    EXPECT_TRUE(open[0][t]);
-    EXPECT_GT(x, 0.15);
-    EXPECT_NEAR(y, 0.15, 0.08);
-  }
-  EXPECT_GT(open_on_other_side, 0);
-  EXPECT_GT(left_out, 0);
 }
 
 TEST(Dressing, NothingRubsWhileSeamsClose) {

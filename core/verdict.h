@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,13 @@ struct Fault {
   std::string message;  // with the value and its bound
 };
 
+// Cloth that is strained too much, along the warp or the weft: 1 % of all by more than `strain`,
+// where cloth that fits is by `most` at most.
+struct TooTight {
+  double strain = 0, most = 0;
+  std::string panel;  // with most of it
+};
+
 // How cloth sits, judged from one frame.
 struct Verdict {
   bool dressed = true;  // seams are closed, weight is in, nothing is held
@@ -26,7 +34,7 @@ struct Verdict {
   double deepest = 0;                 // of them, m
   double strain_warp = 0;             // 99th percentile by area, l / L - 1
   double strain_weft = 0;
-  std::string tightest;         // panel with most cloth that is strained too much
+  std::optional<TooTight> too_tight;
   double largest_pressure = 0;  // of colliders on cloth, Pa
   double slid = 0;              // of what was held: farthest down from its start, its mean, m
   double fallen = 0;            // of sewn sheets without holds: their mean, m

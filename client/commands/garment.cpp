@@ -174,7 +174,9 @@ void add_build(CLI::App& group, Context& context) {
   command->footer(R"(
 What is noteworthy is said with its panel and edge: SEAM_UNEQUAL (one side is
 gathered), EDGE_SHORT, CORNER_SHARP, PANEL_NARROW (low triangles, short steps),
-PANEL_TURNED (seams turn a panel over). What cannot be cut or sewn is refused.
+PANEL_TURNED (seams turn a panel over), PANELS_OVERLAP (panels that are placed
+into each other in one plane start apart). What cannot be cut or sewn is
+refused.
 )");
   command->callback([&context, options] { run_build(context, *options); });
 }

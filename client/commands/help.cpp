@@ -127,7 +127,9 @@ is good is its verdict:
   INSIDE_BODY  particles are inside a body
   SLID_DOWN    what was held has come down by more than 30 mm, or a garment that
                nothing held by more than 150 mm
-  TOO_TIGHT    1 % of the cloth is strained by more than 10 %
+  TOO_TIGHT    1 % of the cloth is strained by more than 10 %, and pulled by
+               more than 30 N/m, or strained by more than 30 %: knits stretch
+               where wovens do not
 )"},
     Topic{"recordings", "Files that hold frames, and what can be done with them",
           R"(A recording holds frames of a session as they were streamed, to the bit, with

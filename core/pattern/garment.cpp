@@ -9,6 +9,7 @@
 
 #include "core/model/text.h"
 #include "core/pattern/borders.h"
+#include "core/pattern/overlaps.h"
 #include "core/pattern/panel_mesher.h"
 #include "core/pattern/sets.h"
 
@@ -37,6 +38,7 @@ class Builder {
     part_doubles();
     if (!problems_.empty()) return std::move(problems_);
     note_corners();
+    place_panels();
     make_sheet();
     note_narrow();
     garment_.notes.insert(garment_.notes.begin(), borders_.notes.begin(), borders_.notes.end());
@@ -184,6 +186,16 @@ class Builder {
     }
   }
 
+  void place_panels() {
+    for (const PatternPanel& panel : pattern_.panels) origins_.push_back(panel.origin);
+    for (const auto& [first, second, way] : draw_apart(pattern_, meshes_, origins_))
+      borders_.notes.push_back(
+          {"PANELS_OVERLAP", at_panel(second),
+           join("panels ", pattern_.panels[first].name, " and ", pattern_.panels[second].name,
+                " are placed into each other in one plane: they start ", way * 1e3,
+                " mm farther apart")});
+  }
+
   void make_sheet() {
     TriangleMesh& mesh = garment_.mesh;
     mesh.start.assign(as_index(particles_), Vector3d::Zero());
@@ -198,7 +210,7 @@ class Builder {
         const Vector2d& point = from.points[i];
         const int particle = particle_[p][i];
         mesh.start[as_index(particle)] +=
-            panel.origin + rotation * Vector3d(point.x(), point.y(), 0);
+            origins_[p] + rotation * Vector3d(point.x(), point.y(), 0);
         ++shares[as_index(particle)];
         mesh.flat.emplace_back(mirrored * point.x(), point.y());
       }
@@ -277,7 +289,8 @@ class Builder {
   std::vector<int> first_;                  // point of each panel
   std::vector<std::vector<int>> particle_;  // of each point of each panel
   int particles_ = 0;
-  std::set<std::size_t> sharp_;  // panels with sharp corners
+  std::vector<Vector3d> origins_;  // of the panels as they start, m
+  std::set<std::size_t> sharp_;    // panels with sharp corners
   Garment garment_;
 };
 

@@ -240,6 +240,23 @@ TEST(Dressing, IsJudgedByWhatIsWrongWithIt) {
   EXPECT_THAT(falling.verdict().faults[1].message, ::testing::HasSubstr("nothing holds it up"));
 }
 
+TEST(Dressing, KnitsFitWhereWovensAreTooTight) {
+  const auto fault_of = [](double tensile, double radius) {
+    Scene scene = around_pole(radius);
+    scene.environment.gravity = Vector3d::Zero();
+    auto& textile = std::get<MeasuredTextile>(scene.sheets[0].textile.model);
+    textile.tensile_warp = textile.tensile_weft = tensile;
+    Simulation simulation(scene);
+    dress(simulation, 150);
+    const auto faults = simulation.verdict().faults;
+    const auto tight = std::ranges::find(faults, "TOO_TIGHT", &Fault::code);
+    return tight == faults.end() ? "" : tight->message;
+  };
+  EXPECT_EQ(fault_of(60, 0.075), "");  // stretched by a fifth
+  EXPECT_THAT(fault_of(1000, 0.075), ::testing::HasSubstr("more than 10 %"));
+  EXPECT_THAT(fault_of(60, 0.09), ::testing::HasSubstr("more than 30 %"));
+}
+
 // How near edges of the tube come to an upright axis, m.
 double distance_from_axis(const Vector3d& at, const Simulation& simulation) {
   const Matrix3Xd x = positions(simulation);

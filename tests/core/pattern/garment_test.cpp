@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -214,6 +215,7 @@ TEST(Garments, ASeamPressedToAnAngleIsOneFoldAlongAllItsPanels) {
 TEST(Garments, AGatherSharesItsFullnessEvenly) {
   Pattern pattern{{rectangle("full", 0.4, 0.1), rectangle("plain", 0.2, 0.1)},
                   {seam({"full", 2}, {"plain", 0})}};
+  pattern.panels[1].origin.y() = 0.1;
   const Garment garment = built(pattern, 0.01);
   ASSERT_EQ(codes(garment), std::set<std::string>{"SEAM_UNEQUAL"});
   EXPECT_NE(garment.notes[0].message.find("a ratio of 2:"), std::string::npos);
@@ -448,6 +450,50 @@ TEST(Garments, ShortEdgesBecomePointsAndSharpCornersAreNoted) {
   EXPECT_NE(sharp.notes[0].message.find("11.31 degrees"), std::string::npos);
   pattern = {{rectangle("strap", 0.003, 0.3)}, {}};
   EXPECT_EQ(codes(built(pattern, 0.01)), (std::set<std::string>{"EDGE_SHORT", "PANEL_NARROW"}));
+}
+
+TEST(Garments, PanelsPlacedIntoEachOtherInOnePlaneStartApart) {
+  // legs of 0.3 m whose middles are 0.2 m apart, in a plane that faces the side
+  Pattern pattern{{rectangle("right", 0.3, 0.4), rectangle("left", 0.3, 0.5)}, {}};
+  const Quaterniond to_side{Eigen::AngleAxisd(pi / 2, Vector3d::UnitY())};
+  for (PatternPanel& each : pattern.panels) each.rotation = to_side;
+  pattern.panels[0].origin = {0.1, 0, 0.1};
+  pattern.panels[1].origin = {0.1, -0.05, -0.1};
+  const Garment garment = built(pattern, 0.02);
+  ASSERT_EQ(codes(garment), std::set<std::string>{"PANELS_OVERLAP"});
+  EXPECT_EQ(garment.notes[0].field, "pattern.panels[1]");
+
+  const TriangleMesh& mesh = garment.mesh;
+  const auto right = static_cast<std::size_t>(mesh.panels[0].triangles);
+  double right_from = 1, right_to = -1, left_from = 1, left_to = -1;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (const int i : mesh.triangles[t]) {
+      const Vector3d& at = mesh.start[static_cast<std::size_t>(i)];
+      EXPECT_NEAR(at.x(), 0.1, 1e-12);
+      double &from = t < right ? right_from : left_from, &to = t < right ? right_to : left_to;
+      from = std::min(from, at.z());
+      to = std::max(to, at.z());
+    }
+  EXPECT_NEAR(right_to - right_from, 0.3, 1e-9);
+  EXPECT_NEAR(left_to - left_from, 0.3, 1e-9);
+  EXPECT_GT(right_from, left_to);
+  EXPECT_LT(right_from - left_to, 0.01);
+  EXPECT_NEAR(right_from + left_to, -0.3, 1e-9);  // both go half of the way
+}
+
+TEST(Garments, PanelsThatTouchOrLieBeforeEachOtherStartWhereTheyArePlaced) {
+  Pattern pattern{{rectangle("one", 0.3, 0.4), rectangle("beside", 0.3, 0.4),
+                   rectangle("before", 0.3, 0.4), rectangle("across", 0.3, 0.4)},
+                  {}};
+  pattern.panels[1].origin = {0.3, 0, 0};
+  pattern.panels[2].origin = {0.1, 0, 0.005};
+  pattern.panels[3].rotation = Eigen::AngleAxisd(pi / 2, Vector3d::UnitX());
+  const Garment garment = built(pattern, 0.02);
+  EXPECT_TRUE(codes(garment).empty());
+  for (const Vector3d& corner :
+       {Vector3d(0, 0, 0), Vector3d(0.6, 0.4, 0), Vector3d(0.4, 0.4, 0.005)})
+    EXPECT_TRUE(std::ranges::any_of(
+        garment.mesh.start, [&](const Vector3d& at) { return (at - corner).norm() < 1e-9; }));
 }
 
 TEST(Garments, CoordinatesAndGrainsNextToNothingAreAsNothing) {

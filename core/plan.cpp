@@ -35,7 +35,7 @@ double area_by_mass(const SheetDefinition& sheet, const Mesh& mesh) {
 // centred, which no step is too long for.
 double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& mesh) {
   double rate = 0;
-  if (scene.solver.integrator != IntegratorKind::kVerlet && mesh.drag.size() > 0)
+  if (!is_verlet(scene.solver.integrator) && mesh.drag.size() > 0)
     rate += mesh.drag.cwiseQuotient(mesh.mass).maxCoeff();
   if (scene.environment.wind) {
     const Wind& wind = *scene.environment.wind;
@@ -59,7 +59,7 @@ std::vector<StableStep> stable_steps(const Scene& scene, const std::vector<Plann
 
 // The longest step that a sheet's damping bears, as a share of its linear bound.
 double share_of(const SolverSettings& solver, const StableStep& stable) {
-  if (solver.integrator != IntegratorKind::kVerlet) return solver.safety;
+  if (!is_verlet(solver.integrator)) return solver.safety;
   return std::min(solver.safety, safe_share(stable.connection_ratio));
 }
 
@@ -67,14 +67,14 @@ double share_of(const SolverSettings& solver, const StableStep& stable) {
 double gain_of(const Scene& scene, const std::vector<PlannedSheet>& planned,
                const std::vector<StableStep>& steps) {
   const SolverSettings& solver = scene.solver;
-  if (solver.step_bound != StepBound::kUnsheared || solver.integrator != IntegratorKind::kVerlet)
+  if (solver.step_bound != StepBound::kUnsheared || !is_verlet(solver.integrator))
     return 1;
   double gain = std::numeric_limits<double>::infinity();
   for (std::size_t s = 0; s < planned.size(); ++s) {
     const auto& [mesh, inverse_mass, x, tethers] = planned[s];
     const double share = unsheared_share(mesh, steps[s].connection_ratio);
     if (share == 0) return 1;
-    const double most = unsheared_gain_of(scene.sheets[s], mesh, inverse_mass,
+    const double most = unsheared_gain_of(scene.sheets[s], mesh, inverse_mass, solver.integrator,
                                           air_rate(scene, scene.sheets[s], mesh));
     gain = std::min(gain, 1 + share * (most - 1));
   }
@@ -332,7 +332,7 @@ void warn_of_damping(const Scene& scene, const std::vector<PlannedSheet>& planne
               " kg/s, a ratio of ", ratio, ", which costs less than 1 % of the step")});
     return;
   }
-  if (scene.solver.integrator != IntegratorKind::kVerlet || safe_share(ratio) == 1) return;
+  if (!is_verlet(scene.solver.integrator) || safe_share(ratio) == 1) return;
   const double safe = share_of(scene.solver, stable) * stable.linear_bound;
   const double enough = damping_of(scene.sheets[index], mesh, kSafeDampingRatio);
   if (const auto& asked = scene.solver.substep; asked && *asked > safe * (1 + 1e-9))

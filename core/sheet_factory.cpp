@@ -48,16 +48,17 @@ StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,
 }
 
 double unsheared_gain_of(const SheetDefinition& sheet, const Mesh& mesh,
-                         const VectorXd& inverse_mass, double air_rate) {
+                         const VectorXd& inverse_mass, IntegratorKind integrator,
+                         double air_rate) {
   const auto* grid = std::get_if<Grid>(&sheet.shape);
   if (grid == nullptr && std::holds_alternative<ChoiKo>(sheet.bending)) return 1;
-  if (grid == nullptr) return unsheared_gain(mesh, inverse_mass, air_rate, {});
+  if (grid == nullptr) return unsheared_gain(mesh, inverse_mass, integrator, air_rate, {});
   SheetDefinition level;
   level.shape = *grid;
   const Matrix3Xd flat = start_positions(level);
-  if (!is_large(sheet.shape)) return unsheared_gain(mesh, inverse_mass, air_rate, flat);
+  if (!is_large(sheet.shape)) return unsheared_gain(mesh, inverse_mass, integrator, air_rate, flat);
   const LatticeSample sample = sample_of(*grid, mesh);
-  return unsheared_gain(sample.mesh, sample.mesh.mass.cwiseInverse(), air_rate,
+  return unsheared_gain(sample.mesh, sample.mesh.mass.cwiseInverse(), integrator, air_rate,
                         flat(Eigen::all, sample.particles));
 }
 
@@ -93,7 +94,7 @@ std::unique_ptr<SheetSolver> make_solver(const Scene& scene, const SheetDefiniti
 
 std::string_view needs_plain_solver(const Scene& scene, const SheetDefinition& sheet) {
   if (scene.solver.plain) return "asked for";
-  if (scene.solver.integrator != IntegratorKind::kVerlet) return "the integrator is not VERLET";
+  if (!is_verlet(scene.solver.integrator)) return "the integrator is not VERLET";
   const auto* law = std::get_if<ChoiKo>(&sheet.bending);
   if (law != nullptr && std::holds_alternative<Triangles>(sheet.shape))
     return "CHOI_KO on triangles";

@@ -90,7 +90,7 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
       set(State::kD, State::kDError, d.x);
       set(State::kD + 1, State::kDError + 1, d.y);
       set(State::kD + 2, State::kDError + 2, d.z);
-      const Places change = times(minus(d, before), real(3));
+      const Places change = times(minus(d, before), real(double{state.lead()}));
       store(State::kW, hn::Add(Of::load(at(State::kW)), Of::rounded(change.x)));
       store(State::kW + 1, hn::Add(Of::load(at(State::kW + 1)), Of::rounded(change.y)));
       store(State::kW + 2, hn::Add(Of::load(at(State::kW + 2)), Of::rounded(change.z)));

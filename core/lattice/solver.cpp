@@ -20,13 +20,13 @@ template <class T>
 class LatticeSolver : public SheetSolver {
  public:
   LatticeSolver(const SheetDefinition& sheet, const Dynamics& dynamics,
-                const std::optional<Wind>& wind, bool compensated)
+                const std::optional<Wind>& wind, bool compensated, IntegratorKind integrator)
       : dynamics_(dynamics),
         columns_(grid_of(sheet).columns),
         particles_(sheet.particle_count()),
         damping_(sheet.textile.damping.value_or(kDefaultDamping)),
         law_(make_sweep_law<T>(sheet)),
-        state_(law_.layout, compensated),
+        state_(law_.layout, compensated, static_cast<T>(lead_of(integrator))),
         gaps_(static_cast<std::size_t>(law_.layout.rows)) {
     law_.compensated = compensated;
     if (wind) law_.wind = make_wind_law<T>(*wind);
@@ -46,9 +46,10 @@ class LatticeSolver : public SheetSolver {
     accelerate(dynamics_, time, x, v, a);
     for_each_particle([&](int i, Place at) {
       set_position(at, x.col(i));
-      set_displacement(at, v.col(i) * dt - a.col(i) * (dt * dt / 2));
-      for (int axis = 0; axis < 3; ++axis)
-        at[State::kW + axis] = static_cast<T>(v(axis, i) * 2 * dt);
+      const Vector3d d = v.col(i) * dt - a.col(i) * (dt * dt / 2);
+      set_displacement(at, d);
+      const Vector3d w = state_.lead() == 2 ? Vector3d(2 * d) : Vector3d(v.col(i) * 2 * dt);
+      for (int axis = 0; axis < 3; ++axis) at[State::kW + axis] = static_cast<T>(w[axis]);
       at[State::kStep2] = static_cast<T>(dynamics_.inverse_mass[i] * dt * dt);
     });
     tethers_ = {dynamics_.tethers, law_.layout};
@@ -76,7 +77,8 @@ class LatticeSolver : public SheetSolver {
     const Place at = state_.place(particle / columns_, particle % columns_);
     set_position(at, x);
     for (int axis = 0; axis < 3; ++axis)
-      at[State::kW + axis] = static_cast<T>(3 * d[axis]) - at[State::kD + axis];
+      at[State::kW + axis] = static_cast<T>(state_.lead() * d[axis]) -
+                             (state_.lead() - 2) * at[State::kD + axis];
     set_displacement(at, d);
     held_moved_ = true;
     if (measures_) moved_ = std::max(moved_, d.norm());
@@ -139,7 +141,7 @@ class LatticeSolver : public SheetSolver {
       set_position(at, position(at) + by.col(k));
       set_displacement(at, displacement(at) + in_step.col(k));
       for (int axis = 0; axis < 3; ++axis)
-        at[State::kW + axis] += static_cast<T>(3 * in_step(axis, k));
+        at[State::kW + axis] += static_cast<T>(state_.lead() * in_step(axis, k));
       ++k;
     }
   }
@@ -273,7 +275,7 @@ class LatticeSolver : public SheetSolver {
         set_position(at, x);
         set_displacement(at, d);
         for (int axis = 0; axis < 3; ++axis)
-          at[State::kW + axis] += static_cast<T>(3 * (d[axis] - before[axis]));
+          at[State::kW + axis] += static_cast<T>(state_.lead() * (d[axis] - before[axis]));
       }
       nearest = std::min(nearest, contacts.gap(x));
     }
@@ -324,8 +326,10 @@ std::unique_ptr<SheetSolver> make_lattice_solver(const SheetDefinition& sheet,
                                                  const std::optional<Wind>& wind,
                                                  const SolverSettings& settings) {
   if (settings.precision == Precision::kDouble)
-    return std::make_unique<LatticeSolver<double>>(sheet, dynamics, wind, false);
-  return std::make_unique<LatticeSolver<float>>(sheet, dynamics, wind, settings.compensated);
+    return std::make_unique<LatticeSolver<double>>(sheet, dynamics, wind, false,
+                                                   settings.integrator);
+  return std::make_unique<LatticeSolver<float>>(sheet, dynamics, wind, settings.compensated,
+                                                settings.integrator);
 }
 
 }  // namespace weft

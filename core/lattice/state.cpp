@@ -6,8 +6,9 @@
 
 namespace weft {
 template <class T>
-SweepState<T>::SweepState(const LatticeLayout<T>& layout, bool compensated)
+SweepState<T>::SweepState(const LatticeLayout<T>& layout, bool compensated, T lead)
     : layout_(layout),
+      lead_(lead),
       planes_(compensated ? kDError + 3 : kXError),
       shared_(shared_size(halo_)),
       local_(static_cast<std::size_t>(layout.rows * local_row())) {

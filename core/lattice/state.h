@@ -48,7 +48,7 @@ class SweepState {
  public:
   enum Plane {
     kX = 0,  // position, m
-    kW = 3,  // 3 d - d_previous: velocity x 2 dt, m
+    kW = 3,  // lead d - (lead - 2) d_previous: velocity x 2 dt, m
     kShared = 6,
     kD = kShared,  // displacement of the last step, m
     kStep2 = 9,    // dt^2 / mass, s^2/kg; 0 holds a particle
@@ -56,8 +56,9 @@ class SweepState {
     kDError = 13,  // what rounding has added to d, m
   };
 
-  SweepState(const LatticeLayout<T>& layout, bool compensated);
+  SweepState(const LatticeLayout<T>& layout, bool compensated, T lead = 3);
 
+  T lead() const { return lead_; }  // of velocities, see lead_of()
   int planes() const { return planes_; }
   int vectors() const { return layout_.vectors(); }
   std::size_t bytes() const { return (shared_.size() + local_.size()) * sizeof(T); }
@@ -113,6 +114,7 @@ class SweepState {
     std::ptrdiff_t shared, local;  // where it is in the row, for plane 0
   };
   LatticeLayout<T> layout_;
+  T lead_;
   int planes_;
   int halo_ = LatticeLayout<T>::kHalo;  // 0: packed
   std::vector<Column> columns_;

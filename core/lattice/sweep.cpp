@@ -533,7 +533,8 @@ class Sweep {
       next = hn::Add(old, change);
       there = hn::Add(at, next);
     }
-    hn::Store(hn::MulSub(hn::Set(d, T(3)), next, old), d, shared(State::kW));
+    const V lagged = hn::Mul(hn::Set(d, state_.lead() - 2), old);
+    hn::Store(hn::MulSub(hn::Set(d, state_.lead()), next, lagged), d, shared(State::kW));
     hn::Store(next, d, local(State::kD));
     hn::Store(there, d, shared(State::kX));
     return next;

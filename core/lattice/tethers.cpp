@@ -51,11 +51,11 @@ class TetheredVector {
     return back;
   }
 
-  HWY_INLINE void store(bool compensated) const {
+  HWY_INLINE void store(bool compensated, T lead) const {
     if (hn::AllFalse(D(), moved_)) return;
-    store_axis(compensated, 0, by_.x);
-    store_axis(compensated, 1, by_.y);
-    store_axis(compensated, 2, by_.z);
+    store_axis(compensated, lead, 0, by_.x);
+    store_axis(compensated, lead, 1, by_.y);
+    store_axis(compensated, lead, 2, by_.z);
   }
 
  private:
@@ -72,12 +72,12 @@ class TetheredVector {
                                   : local_ + (plane - State::kShared) * kLanes;
   }
 
-  HWY_INLINE void store_axis(bool compensated, int axis, V by) const {
+  HWY_INLINE void store_axis(bool compensated, T lead, int axis, V by) const {
     const D d;
     add(compensated, at(State::kX + axis), at(State::kXError + axis), by);
     add(compensated, at(State::kD + axis), at(State::kDError + axis), by);
     T* const w = at(State::kW + axis);
-    put(hn::MulAdd(by, hn::Set(d, T(3)), hn::Load(d, w)), w);
+    put(hn::MulAdd(by, hn::Set(d, lead), hn::Load(d, w)), w);
   }
   HWY_INLINE void add(bool compensated, T* value, T* error, V by) const {
     const D d;
@@ -124,7 +124,7 @@ T pull_back_as(const LatticeTethers<T>& tethers, T inward, bool compensated, int
               particles.pull_back({of(0), of(1), of(2)}, {of(3), of(4), of(5)}, length, most);
           farthest = hn::Max(farthest, back);
         }
-        particles.store(compensated);
+        particles.store(compensated, state.lead());
       }
   return hn::GetLane(hn::MaxOfLanes(d, farthest));
 }

@@ -20,6 +20,7 @@ SolverSettings default_settings(Accuracy accuracy) {
   if (accuracy == Accuracy::kDraft) {
     settings.max_self_weight_strain = 0.01;
     settings.step_bound = StepBound::kUnsheared;
+    settings.integrator = IntegratorKind::kLaggedVerlet;
   }
   if (accuracy == Accuracy::kFine) {
     settings.precision = Precision::kDouble;

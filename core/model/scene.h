@@ -134,7 +134,16 @@ struct Environment {
   std::optional<Wind> wind;
 };
 
-enum class IntegratorKind { kVerlet, kEuler, kMidpoint, kRk4 };
+enum class IntegratorKind {
+  kVerlet,
+  kEuler,
+  kMidpoint,
+  kRk4,
+  kLaggedVerlet  // forces see velocities of half a step ago
+};
+inline bool is_verlet(IntegratorKind kind) {
+  return kind == IntegratorKind::kVerlet || kind == IntegratorKind::kLaggedVerlet;
+}
 
 // Of positions and forces while stepping.
 enum class Precision { kSingle, kDouble };
@@ -165,7 +174,7 @@ struct SolverSettings {
 // How close to its equations a scene is computed that does not say it value by value; the interface
 // has the errors.
 enum class Accuracy {
-  kDraft,     // sheets stretch by 1 % under their weight where their textile would less; long steps
+  kDraft,     // sheets stretch by 1 % under their weight where their textile would less; long steps, lagged damping
   kStandard,  // errors are far below what the mesh makes
   kFine       // double precision and a quarter of the step
 };

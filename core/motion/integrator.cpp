@@ -11,9 +11,10 @@ std::unique_ptr<Integrator> make_integrator(IntegratorKind kind) {
     case IntegratorKind::kRk4:
       return make_rk4();
     case IntegratorKind::kVerlet:
+    case IntegratorKind::kLaggedVerlet:
       break;
   }
-  return make_verlet();
+  return make_verlet(lead_of(kind));
 }
 
 void accelerate(const Dynamics& dynamics, double time, const Matrix3Xd& x, const Matrix3Xd& v,

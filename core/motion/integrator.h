@@ -44,7 +44,13 @@ class Integrator {
   virtual void velocity(const Motion& motion, double dt, Matrix3Xd& v) const = 0;
 };
 
-std::unique_ptr<Integrator> make_verlet();
+// Verlet's forces see the velocity (lead d - (lead - 2) d_previous) / (2 dt): extrapolated to the
+// present, or of half a step ago.
+constexpr double lead_of(IntegratorKind kind) {
+  return kind == IntegratorKind::kLaggedVerlet ? 2 : 3;
+}
+
+std::unique_ptr<Integrator> make_verlet(double lead);
 std::unique_ptr<Integrator> make_euler();
 std::unique_ptr<Integrator> make_midpoint();
 std::unique_ptr<Integrator> make_rk4();

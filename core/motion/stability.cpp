@@ -12,6 +12,7 @@
 #include "core/forces/elastic.h"
 #include "core/forces/hinges.h"
 #include "core/forces/membrane.h"
+#include "core/motion/integrator.h"
 #include "core/motion/surface_bound.h"
 
 namespace weft {
@@ -302,18 +303,29 @@ double largest_eigenvalue(const Matrix& matrix) {
   return std::max(0.0, largest);
 }
 
-// The dt at which the largest eigenvalue of dt^2 K + 4 dt C reaches 4, from those apart, or bounds
-// of them. What is left of a last change is of its second order.
-template <class Matrix>
-double verlet_step(Matrix& matrix, double stiffness, double damping, double last_change) {
+// How many dt C count in Verlet's limit, dt^2 K + weight dt C = 4.
+double damping_weight(IntegratorKind kind) { return 2 * (lead_of(kind) - 1); }
+
+// dt by the largest eigenvalues of K and C, or bounds of them.
+double verlet_step(IntegratorKind kind, double stiffness, double damping) {
   if (stiffness <= 0 && damping <= 0) return kInfinity;
-  // by the largest eigenvalues apart, then refined: on a log scale the root is nearly linear
-  double dt = 2 / (damping + std::sqrt(damping * damping + stiffness));
-  if (damping == 0) return dt;
+  damping *= damping_weight(kind) / 4;
+  return 2 / (damping + std::sqrt(damping * damping + stiffness));
+}
+
+// The dt at which the largest eigenvalue of both together reaches 4, from those apart. What is left
+// of a last change is of its second order.
+template <class Matrix>
+double verlet_step(IntegratorKind kind, Matrix& matrix, double stiffness, double damping,
+                   double last_change) {
+  double dt = verlet_step(kind, stiffness, damping);
+  if (dt == kInfinity || damping == 0) return dt;
+  const double weight = damping_weight(kind);
+  // on a log scale the root is nearly linear
   for (int i = 0; i < 6; ++i) {
-    matrix.set_factors(dt * dt, 4 * dt);
+    matrix.set_factors(dt * dt, weight * dt);
     const double value = largest_eigenvalue(matrix);
-    const double share = 4 * dt * damping / (4 * dt * damping + dt * dt * stiffness);
+    const double share = weight * dt * damping / (weight * dt * damping + dt * dt * stiffness);
     const double factor = std::pow(4 / value, 1 / (2 - share));
     dt *= factor;
     if (std::abs(factor - 1) < last_change) break;
@@ -339,8 +351,8 @@ double velocity_step(IntegratorKind kind, double stiffness, double damping, doub
 
 template <class Matrix>
 double limit(IntegratorKind kind, Matrix& matrix, double stiffness, double damping, double ratio) {
-  return kind == IntegratorKind::kVerlet ? verlet_step(matrix, stiffness, damping, 1e-4)
-                                         : velocity_step(kind, stiffness, damping, ratio);
+  return is_verlet(kind) ? verlet_step(kind, matrix, stiffness, damping, 1e-4)
+                         : velocity_step(kind, stiffness, damping, ratio);
 }
 
 Block jacobian_block(const Family& family, const Connection& connection, const Matrix3Xd& x) {
@@ -366,12 +378,9 @@ double eigenvalue(Matrix& matrix, double stiffness, double damping) {
   return largest_eigenvalue(matrix);
 }
 
-// Where the largest eigenvalues of K and C reach dt^2 K + 4 dt C = 4 M, or the limit of another
-// integrator.
 double limit(IntegratorKind kind, double stiffness, double damping) {
-  if (kind != IntegratorKind::kVerlet) return velocity_step(kind, stiffness, damping, 0);
-  if (stiffness <= 0 && damping <= 0) return kInfinity;
-  return 2 / (damping + std::sqrt(damping * damping + stiffness));
+  return is_verlet(kind) ? verlet_step(kind, stiffness, damping)
+                         : velocity_step(kind, stiffness, damping, 0);
 }
 
 // What resists and damps each free particle of triangles at most, over its mass, 1/s^2 and 1/s.
@@ -429,8 +438,8 @@ double limit(IntegratorKind kind, SurfaceOperator& matrix, double gamma) {
   const double apart = limit(kind, stiffness, gamma);
   // only where damping counts do both have to be seen together
   constexpr double kCounts = 0.005, kLastChange = 0.02;
-  if (kind != IntegratorKind::kVerlet || apart * gamma <= kCounts) return apart;
-  return verlet_step(matrix, stiffness, gamma, kLastChange);
+  if (!is_verlet(kind) || apart * gamma <= kCounts) return apart;
+  return verlet_step(kind, matrix, stiffness, gamma, kLastChange);
 }
 
 // The bound holds up to a strain of kBoundStrain, or up to that of the shape; the estimate takes
@@ -497,16 +506,15 @@ StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, Integrato
   return step;
 }
 
-double unsheared_gain(const Mesh& mesh, const VectorXd& inverse_mass, double air_rate,
-                      const Matrix3Xd& flat) {
-  constexpr auto kVerlet = IntegratorKind::kVerlet;
+double unsheared_gain(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
+                      double air_rate, const Matrix3Xd& flat) {
   if (!mesh.surface.membrane.empty() || !mesh.surface.fits.empty()) {
     const SurfaceStep any =
-        bounded_step(mesh, inverse_mass, kVerlet, air_rate, surface_bound(mesh, 0.0));
+        bounded_step(mesh, inverse_mass, integrator, air_rate, surface_bound(mesh, 0.0));
     SurfaceOperator at_rest(mesh, inverse_mass, air_rate, [](const MembraneElement&) {
       return Threads{Vector3d::UnitX(), Vector3d::UnitY()};
     });
-    return std::max(1.0, limit(kVerlet, at_rest, any.damping) / any.bound);
+    return std::max(1.0, limit(integrator, at_rest, any.damping) / any.bound);
   }
   Graph graph(mesh, inverse_mass, mesh.damping, air_rate);
   Jacobian taut(mesh, inverse_mass, mesh.damping, air_rate);
@@ -514,8 +522,8 @@ double unsheared_gain(const Mesh& mesh, const VectorXd& inverse_mass, double air
     for (const auto& [i, j] : family.connections)
       taut.add({i, j, (flat.col(j) - flat.col(i)).normalized(), stiffness_of(family), 0});
   const double gamma = mesh.damping > 0 || air_rate > 0 ? eigenvalue(graph, 0, 1) : 0;
-  const double any = verlet_step(graph, eigenvalue(graph, 1, 0), gamma, 1e-4);
-  const double unsheared = verlet_step(taut, eigenvalue(taut, 1, 0), gamma, 1e-4);
+  const double any = verlet_step(integrator, graph, eigenvalue(graph, 1, 0), gamma, 1e-4);
+  const double unsheared = verlet_step(integrator, taut, eigenvalue(taut, 1, 0), gamma, 1e-4);
   return any < kInfinity ? std::max(1.0, unsheared / any) : 1;
 }
 

@@ -16,7 +16,7 @@ struct StableStep {
 };
 
 // With K and C the stiffness and damping matrices, Verlet with extrapolated damping is stable while
-// dt^2 K + 4 dt C < 4 M. The bound replaces K by the graph Laplacian of the largest stiffness of
+// dt^2 K + 4 dt C < 4 M, with lagged damping while dt^2 K + 2 dt C < 4 M. The bound replaces K by the graph Laplacian of the largest stiffness of
 // each connection, whatever its direction, and of triangles by diagonal matrices that bound theirs
 // (surface_bound.h); the estimate takes the Jacobian at x. air_rate: damping
 // by wind, 1/s. x: (3 x n) m; empty, of a lattice: without an estimate.
@@ -31,8 +31,8 @@ double linear_bound(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKi
 // How many times as long Verlet's linear bound is for shapes in which threads cross as in the flat
 // one, however they are bent; 1 or more. flat: positions of a lattice in its plane (3 x n) m;
 // triangles have their own.
-double unsheared_gain(const Mesh& mesh, const VectorXd& inverse_mass, double air_rate,
-                      const Matrix3Xd& flat);
+double unsheared_gain(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
+                      double air_rate, const Matrix3Xd& flat);
 
 // The k_d with which the stiffest mode of a sheet that nothing holds has a damping ratio, kg/s; 0
 // where nothing is stiff.

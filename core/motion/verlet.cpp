@@ -4,16 +4,19 @@ namespace weft {
 namespace {
 
 // Velocity-less Verlet (eq. 8) in summed form: d' = d + a dt^2, x' = x + d'. Second order with
-// damping: forces see the velocity extrapolated to the present, (3 d - d_previous) / (2 dt); drag
-// is centred, -c (d' + d) / (2 dt).
+// damping where forces see the velocity extrapolated to the present, see lead_of(), first order
+// where they see d / dt; drag is centred, -c (d' + d) / (2 dt).
 class Verlet : public Integrator {
  public:
+  explicit Verlet(double lead) : lead_(lead) {}
+
   void start(const Dynamics& dynamics, double time, double dt, const Matrix3Xd& v,
              Motion& motion) override {
     // half a kick: x(-dt) = x - v dt + a dt^2 / 2
     accelerate(dynamics, time, motion.x, v, a_);
     motion.d = v * dt - a_ * (dt * dt / 2);
-    motion.d_previous = 3 * motion.d - v * (2 * dt);
+    motion.d_previous = motion.d;
+    if (lead_ != 2) motion.d_previous = (lead_ * motion.d - v * (2 * dt)) / (lead_ - 2);
   }
 
   void advance(const Dynamics& dynamics, double time, double dt, Motion& motion) override {
@@ -50,15 +53,16 @@ class Verlet : public Integrator {
   }
 
   void velocity(const Motion& motion, double dt, Matrix3Xd& v) const override {
-    v = (3 * motion.d - motion.d_previous) / (2 * dt);
+    v = (lead_ * motion.d - (lead_ - 2) * motion.d_previous) / (2 * dt);
   }
 
  private:
+  double lead_;
   Matrix3Xd v_, a_;
 };
 
 }  // namespace
 
-std::unique_ptr<Integrator> make_verlet() { return std::make_unique<Verlet>(); }
+std::unique_ptr<Integrator> make_verlet(double lead) { return std::make_unique<Verlet>(lead); }
 
 }  // namespace weft

@@ -70,7 +70,7 @@ double resolve_block_as(const Contacts& contacts, const Vector3d& origin, bool c
     Lanes place, displacement, change;
     place.store(minus(x, everywhere(origin)));
     displacement.store(moved);
-    change.store(times(minus(moved, before), real(3)));
+    change.store(times(minus(moved, before), real(double{state.lead})));
     for (std::size_t k = 0; k < Lanes::kMost; ++k) {
       if (touched[k] == 0) continue;
       for (std::size_t axis = 0; axis < 3; ++axis) {

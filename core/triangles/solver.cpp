@@ -20,12 +20,12 @@ template <class T>
 class TriangleSolver : public SheetSolver {
  public:
   TriangleSolver(const Mesh& mesh, const Dynamics& dynamics, const std::optional<Wind>& wind,
-                 bool compensated, TriangleLaw<T> law)
+                 bool compensated, IntegratorKind integrator, TriangleLaw<T> law)
       : mesh_(mesh),
         dynamics_(dynamics),
         particles_(static_cast<int>(mesh.mass.size())),
         law_(std::move(law)),
-        state_(particles_, compensated),
+        state_(particles_, compensated, static_cast<T>(lead_of(integrator))),
         gaps_(static_cast<std::size_t>(law_.blocks())) {
     law_.compensated = compensated;
     law_.drags = dynamics.drag.size() > 0;
@@ -47,8 +47,9 @@ class TriangleSolver : public SheetSolver {
     accelerate(dynamics_, time, x, v, a);
     for (int i = 0; i < particles_; ++i) {
       set(state_.x, state_.x_error, i, x.col(i) - origin_);
-      set(state_.d, state_.d_error, i, v.col(i) * dt - a.col(i) * (dt * dt / 2));
-      put(state_.w, i, v.col(i) * (2 * dt));
+      const Vector3d d = v.col(i) * dt - a.col(i) * (dt * dt / 2);
+      set(state_.d, state_.d_error, i, d);
+      put(state_.w, i, state_.lead == 2 ? Vector3d(2 * d) : Vector3d(v.col(i) * (2 * dt)));
     }
     gaps_.forget();
     pushed_ = 0;
@@ -73,7 +74,8 @@ class TriangleSolver : public SheetSolver {
     const std::size_t at = place(particle);
     for (std::size_t axis = 0; axis < 3; ++axis)
       state_.w.data()[at + axis] =
-          static_cast<T>(3 * d[static_cast<Eigen::Index>(axis)]) - state_.d.data()[at + axis];
+          static_cast<T>(state_.lead * d[static_cast<Eigen::Index>(axis)]) -
+          (state_.lead - 2) * state_.d.data()[at + axis];
     set(state_.d, state_.d_error, particle, d);
     if (measures_) moved_ = std::max(moved_, d.norm());
   }
@@ -262,7 +264,7 @@ class TriangleSolver : public SheetSolver {
     set_at(state_.x, state_.x_error, at, position_at(at) + by - origin_);
     set_at(state_.d, state_.d_error, at, exact(state_.d, state_.d_error, at) + in_step);
     for (std::size_t axis = 0; axis < 3; ++axis)
-      state_.w.data()[at + axis] += static_cast<T>(3 * in_step[static_cast<Eigen::Index>(axis)]);
+      state_.w.data()[at + axis] += static_cast<T>(state_.lead * in_step[static_cast<Eigen::Index>(axis)]);
   }
   void put(AlignedArray<T>& plane, int particle, const Vector3d& values) {
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -285,7 +287,7 @@ class TriangleSolver : public SheetSolver {
         set_at(state_.d, state_.d_error, at, d);
         for (std::size_t axis = 0; axis < 3; ++axis) {
           const auto k = static_cast<Eigen::Index>(axis);
-          state_.w.data()[at + axis] += static_cast<T>(3 * (d[k] - before[k]));
+          state_.w.data()[at + axis] += static_cast<T>(state_.lead * (d[k] - before[k]));
         }
       }
       nearest = std::min(nearest, contacts.gap(x));
@@ -328,10 +330,12 @@ class TriangleSolver : public SheetSolver {
 
 template <class T>
 std::unique_ptr<SheetSolver> make(const Mesh& mesh, const Dynamics& dynamics,
-                                  const std::optional<Wind>& wind, bool compensated) {
+                                  const std::optional<Wind>& wind, bool compensated,
+                                  IntegratorKind integrator) {
   auto law = make_triangle_law<T>(mesh, wind.has_value());
-  if (!law) return make_plain_solver(dynamics, IntegratorKind::kVerlet);
-  return std::make_unique<TriangleSolver<T>>(mesh, dynamics, wind, compensated, std::move(*law));
+  if (!law) return make_plain_solver(dynamics, integrator);
+  return std::make_unique<TriangleSolver<T>>(mesh, dynamics, wind, compensated, integrator,
+                                             std::move(*law));
 }
 
 }  // namespace
@@ -339,8 +343,9 @@ std::unique_ptr<SheetSolver> make(const Mesh& mesh, const Dynamics& dynamics,
 std::unique_ptr<SheetSolver> make_triangle_solver(const Mesh& mesh, const Dynamics& dynamics,
                                                   const std::optional<Wind>& wind,
                                                   const SolverSettings& settings) {
-  if (settings.precision == Precision::kDouble) return make<double>(mesh, dynamics, wind, false);
-  return make<float>(mesh, dynamics, wind, settings.compensated);
+  if (settings.precision == Precision::kDouble) 
+    return make<double>(mesh, dynamics, wind, false, settings.integrator);
+  return make<float>(mesh, dynamics, wind, settings.compensated, settings.integrator);
 }
 
 }  // namespace weft

@@ -258,7 +258,8 @@ HWY_INLINE void move_block(D d, const TriangleLaw<T>& law, TriangleState<T>& sta
       next = hn::Add(old, change);
       there = hn::Add(at, next);
     }
-    hn::Store(hn::MulSub(hn::Set(d, T(3)), next, old), d, state.next_w.data() + i);
+    const V lagged = hn::Mul(hn::Set(d, state.lead - 2), old);
+    hn::Store(hn::MulSub(hn::Set(d, state.lead), next, lagged), d, state.next_w.data() + i);
     hn::Store(next, d, state.d.data() + i);
     hn::Store(there, d, state.next_x.data() + i);
     if (law.measured) largest = hn::Max(largest, hn::Abs(next));
@@ -375,7 +376,8 @@ void step(const TriangleLaw<T>& law, TriangleState<T>& state, std::size_t first,
 }  // namespace
 
 template <class T>
-TriangleState<T>::TriangleState(int particles, bool compensated) {
+TriangleState<T>::TriangleState(int particles, bool compensated, T velocity_lead)
+    : lead(velocity_lead) {
   constexpr int kBlock = TriangleLaw<T>::kBlock;
   const auto size = 4 * static_cast<std::size_t>((particles + kBlock - 1) / kBlock * kBlock);
   for (auto* plane : {&x, &w, &d}) *plane = AlignedArray<T>(size);

@@ -11,10 +11,12 @@ namespace weft {
 // A sheet of triangles in motion. Of every particle, four values of each, the last of them 0.
 template <class T>
 struct TriangleState {
-  TriangleState(int particles, bool compensated);
+  TriangleState(int particles, bool compensated, T velocity_lead = 3);
+
+  T lead;  // of velocities, see lead_of()
 
   AlignedArray<T> x;        // position, m
-  AlignedArray<T> w;        // 3 d - d_previous: velocity x 2 dt, m
+  AlignedArray<T> w;        // lead d - (lead - 2) d_previous: velocity x 2 dt, m
   AlignedArray<T> d;        // displacement of the last step, m
   AlignedArray<T> x_error;  // what rounding has added to x, m; with compensation only, as the next
   AlignedArray<T> d_error;  // what rounding has added to d, m

@@ -23,7 +23,7 @@ constexpr std::array kEvaluators = {Evaluator::kLinearized, Evaluator::kSeries, 
                                     Evaluator::kLinearized, Evaluator::kPolynomial};
 constexpr std::array kIntegrators = {IntegratorKind::kVerlet, IntegratorKind::kVerlet,
                                      IntegratorKind::kEuler, IntegratorKind::kMidpoint,
-                                     IntegratorKind::kRk4};
+                                     IntegratorKind::kRk4,    IntegratorKind::kLaggedVerlet};
 constexpr std::array kLabTests = {LabTest::kTensile, LabTest::kTensile,    LabTest::kShear,
                                   LabTest::kBending, LabTest::kCantilever, LabTest::kChain,
                                   LabTest::kDrape};
@@ -479,7 +479,8 @@ Environment Reader::environment(const v1::Environment& from) {
 
 SolverSettings Reader::solver(const v1::SolverSettings& from, bool dressed) {
   SolverSettings solver = default_settings(accuracy_);
-  solver.integrator = choice(kIntegrators, from.integrator(), "solver.integrator");
+  if (from.integrator() != v1::INTEGRATOR_UNSPECIFIED)
+    solver.integrator = choice(kIntegrators, from.integrator(), "solver.integrator");
   if (from.step_bound() != v1::STEP_BOUND_UNSPECIFIED)
     solver.step_bound = choice(kStepBounds, from.step_bound(), "solver.step_bound");
   else if (dressed && accuracy_ == Accuracy::kStandard)

@@ -46,6 +46,8 @@ v1::Integrator to_proto(IntegratorKind integrator) {
       return v1::INTEGRATOR_MIDPOINT;
     case IntegratorKind::kRk4:
       return v1::INTEGRATOR_RK4;
+    case IntegratorKind::kLaggedVerlet:
+      return v1::INTEGRATOR_VERLET_LAGGED;
   }
   return v1::INTEGRATOR_UNSPECIFIED;
 }

@@ -79,7 +79,8 @@ TEST(Simulation, SimulationsThatTakeTurnsDoNotDisturbEachOther) {
 }
 
 TEST(Simulation, AHeldParticleNeverMovesAndALedOneNeverLeavesItsPath) {
-  for (const auto integrator : {IntegratorKind::kVerlet, IntegratorKind::kRk4}) {
+  for (const auto integrator :
+       {IntegratorKind::kVerlet, IntegratorKind::kRk4, IntegratorKind::kLaggedVerlet}) {
     Scene scene = hanging();
     scene.solver.integrator = integrator;
     const Path path = {

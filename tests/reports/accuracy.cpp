@@ -226,9 +226,9 @@ class AccuracyPage {
         "ms per simulated second. DRAFT lets a sheet stretch by 1 % under its own weight, where "
         "its textile would less, for longer steps, and its error is that; FINE is double precision "
         "at a quarter of the step. UNSHEARED, which DRAFT has as well, is the longer step that "
-        "holds "
-        "where threads cross nearly as in the flat sheet (`solver.step_bound`). The last column is "
-        "what the next finer mesh changes.");
+        "holds where threads cross nearly as in the flat sheet (`solver.step_bound`); DRAFT damps "
+        "by velocities half a step old, too (VERLET_LAGGED). The last column is what the next "
+        "finer mesh changes.");
     std::vector<Cells> rows;
     std::array<Range, kAccuracies.size()> error, time;
     for (std::size_t k = 0; k < all_.size(); ++k) {

@@ -203,6 +203,8 @@ std::string integrator_name(IntegratorKind kind) {
       return "midpoint";
     case IntegratorKind::kRk4:
       return "RK4";
+    case IntegratorKind::kLaggedVerlet:
+      return "lagged Verlet";
     case IntegratorKind::kVerlet:
       break;
   }

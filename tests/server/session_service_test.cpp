@@ -214,6 +214,8 @@ TEST(Accuracy, SetsWhatASceneLeavesOpenAndNothingElse) {
   EXPECT_EQ(draft.scene().solver().safety(), 0.9);
   EXPECT_EQ(draft.scene().solver().step_bound(), v1::STEP_BOUND_UNSHEARED);
   EXPECT_EQ(standard.scene().solver().step_bound(), v1::STEP_BOUND_EVERY_SHAPE);
+  EXPECT_EQ(draft.scene().solver().integrator(), v1::INTEGRATOR_VERLET_LAGGED);
+  EXPECT_EQ(standard.scene().solver().integrator(), v1::INTEGRATOR_VERLET);
 
   const v1::Session fine = created(v1::ACCURACY_FINE);
   EXPECT_EQ(fine.scene().solver().precision(), v1::PRECISION_DOUBLE);

@@ -48,8 +48,10 @@ double tolerance(const Scene& scene, double epsilon) {
 }
 
 void expect_like_plain(const SheetDefinition& sheet, const std::string& what,
-                       const std::optional<Wind>& wind = {}) {
+                       const std::optional<Wind>& wind = {},
+                       IntegratorKind integrator = IntegratorKind::kVerlet) {
   Scene scene = crumpled(sheet, wind);
+  scene.solver.integrator = integrator;
   scene.solver.plain = true;
   const Simulation plain = after(scene, kSteps);
   scene.solver.plain = false;
@@ -227,6 +229,17 @@ TEST_P(Kernels, GiveTheSameBitsInAnyNumberOfBands) {
   for (const int bands : {2, 3, 7, 11}) {
     EXPECT_EQ(swept<float>(sheet, false, bands), single) << bands;
     EXPECT_EQ(swept<double>(sheet, false, bands), twofold) << bands;
+  }
+}
+
+TEST_P(Kernels, FollowThePlainSolverWithVelocitiesOfHalfAStepAgo) {
+  Wind wind;
+  wind.velocity = {3, 1, -5};
+  for (const auto& [rows, columns] : {std::pair(2, 3), std::pair(17, 35)}) {
+    SheetDefinition sheet = flat_sheet(rows, columns);
+    GetParam().set(sheet);
+    expect_like_plain(sheet, std::to_string(rows) + " x " + std::to_string(columns), wind,
+                      IntegratorKind::kLaggedVerlet);
   }
 }
 

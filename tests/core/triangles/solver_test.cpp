@@ -201,8 +201,10 @@ Simulation after(Scene scene, int frames) {
 // extent; with K dt^2 / m below 1 / 2 an acceleration error of every step adds up to
 // n (n + 1) / 2 of them.
 void expect_like_plain(const SheetDefinition& sheet, const std::string& what,
-                       const std::optional<Wind>& wind = {}) {
+                       const std::optional<Wind>& wind = {},
+                       IntegratorKind integrator = IntegratorKind::kVerlet) {
   Scene scene = crumpled(sheet, wind);
+  scene.solver.integrator = integrator;
   scene.solver.plain = true;
   const Simulation plain = after(scene, kSteps);
   scene.solver.plain = false;
@@ -243,6 +245,14 @@ TEST_P(TriangleKernels, FollowThePlainSolverInWind) {
     GetParam().set(sheet);
     expect_like_plain(sheet, form.name, wind);
   }
+}
+
+TEST_P(TriangleKernels, FollowThePlainSolverWithVelocitiesOfHalfAStepAgo) {
+  Wind wind;
+  wind.velocity = {3, 1, -5};
+  SheetDefinition sheet = sheet_of(two_panels());
+  GetParam().set(sheet);
+  expect_like_plain(sheet, "two panels", wind, IntegratorKind::kLaggedVerlet);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sheets, TriangleKernels, ::testing::ValuesIn(kFeatures),

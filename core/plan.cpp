@@ -67,8 +67,7 @@ double share_of(const SolverSettings& solver, const StableStep& stable) {
 double gain_of(const Scene& scene, const std::vector<PlannedSheet>& planned,
                const std::vector<StableStep>& steps) {
   const SolverSettings& solver = scene.solver;
-  if (solver.step_bound != StepBound::kUnsheared || !is_verlet(solver.integrator))
-    return 1;
+  if (solver.step_bound != StepBound::kUnsheared || !is_verlet(solver.integrator)) return 1;
   double gain = std::numeric_limits<double>::infinity();
   for (std::size_t s = 0; s < planned.size(); ++s) {
     const auto& [mesh, inverse_mass, x, tethers] = planned[s];

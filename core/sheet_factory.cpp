@@ -48,8 +48,7 @@ StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,
 }
 
 double unsheared_gain_of(const SheetDefinition& sheet, const Mesh& mesh,
-                         const VectorXd& inverse_mass, IntegratorKind integrator,
-                         double air_rate) {
+                         const VectorXd& inverse_mass, IntegratorKind integrator, double air_rate) {
   const auto* grid = std::get_if<Grid>(&sheet.shape);
   if (grid == nullptr && std::holds_alternative<ChoiKo>(sheet.bending)) return 1;
   if (grid == nullptr) return unsheared_gain(mesh, inverse_mass, integrator, air_rate, {});

@@ -26,8 +26,7 @@ StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,
                           const Matrix3Xd& x);
 // 1 where that is not known.
 double unsheared_gain_of(const SheetDefinition& sheet, const Mesh& mesh,
-                         const VectorXd& inverse_mass, IntegratorKind integrator,
-                         double air_rate);
+                         const VectorXd& inverse_mass, IntegratorKind integrator, double air_rate);
 double damping_of(const SheetDefinition& sheet, const Mesh& mesh, double ratio);
 
 // What keeps a sheet's free particles within the reach of held ones, if it asks for that.

@@ -77,8 +77,8 @@ class LatticeSolver : public SheetSolver {
     const Place at = state_.place(particle / columns_, particle % columns_);
     set_position(at, x);
     for (int axis = 0; axis < 3; ++axis)
-      at[State::kW + axis] = static_cast<T>(state_.lead() * d[axis]) -
-                             (state_.lead() - 2) * at[State::kD + axis];
+      at[State::kW + axis] =
+          static_cast<T>(state_.lead() * d[axis]) - (state_.lead() - 2) * at[State::kD + axis];
     set_displacement(at, d);
     held_moved_ = true;
     if (measures_) moved_ = std::max(moved_, d.norm());

@@ -198,8 +198,9 @@ class MeshCheck {
         const int count = found == triangles.end() ? 0 : found->second;
         if (count != 2)
           problem(at + ".particles", particles[k], " and ", particles[k + 1],
-                  count == 0 ? " are not the ends of an edge"
-                             : " are the ends of an edge of one triangle; there is nothing to fold");
+                  count == 0
+                      ? " are not the ends of an edge"
+                      : " are the ends of an edge of one triangle; there is nothing to fold");
         else if (const auto [other, added] = taken.emplace(edge, f); !added)
           problem(at + ".particles", "the edge of ", particles[k], " and ", particles[k + 1],
                   " is folded already, by folds[", other->second, "]");

@@ -174,7 +174,8 @@ struct SolverSettings {
 // How close to its equations a scene is computed that does not say it value by value; the interface
 // has the errors.
 enum class Accuracy {
-  kDraft,     // sheets stretch by 1 % under their weight where their textile would less; long steps, lagged damping
+  kDraft,  // sheets stretch by 1 % under their weight where their textile would less; long steps,
+           // lagged damping
   kStandard,  // errors are far below what the mesh makes
   kFine       // double precision and a quarter of the step
 };

@@ -16,10 +16,11 @@ struct StableStep {
 };
 
 // With K and C the stiffness and damping matrices, Verlet with extrapolated damping is stable while
-// dt^2 K + 4 dt C < 4 M, with lagged damping while dt^2 K + 2 dt C < 4 M. The bound replaces K by the graph Laplacian of the largest stiffness of
-// each connection, whatever its direction, and of triangles by diagonal matrices that bound theirs
-// (surface_bound.h); the estimate takes the Jacobian at x. air_rate: damping
-// by wind, 1/s. x: (3 x n) m; empty, of a lattice: without an estimate.
+// dt^2 K + 4 dt C < 4 M, with lagged damping while dt^2 K + 2 dt C < 4 M. The bound replaces K by
+// the graph Laplacian of the largest stiffness of each connection, whatever its direction, and of
+// triangles by diagonal matrices that bound theirs (surface_bound.h); the estimate takes the
+// Jacobian at x. air_rate: damping by wind, 1/s. x: (3 x n) m; empty, of a lattice: without an
+// estimate.
 StableStep stable_step(const Mesh& mesh, const VectorXd& inverse_mass, IntegratorKind integrator,
                        double air_rate, const Matrix3Xd& x);
 

@@ -34,7 +34,7 @@ struct Borders {
   std::vector<Border> panels;
   std::vector<std::pair<BorderPoint, BorderPoint>> sewn;  // points that are one
   std::vector<BorderFold> folds;
-  std::vector<bool> turned;                               // panels that seams turn over
+  std::vector<bool> turned;  // panels that seams turn over
   std::vector<Warning> notes;
   std::vector<Problem> problems;  // where there are any, the rest is void
 };

@@ -237,7 +237,8 @@ class Builder {
   void add_fold(const BorderFold& line) {
     std::vector<Fold>& folds = garment_.mesh.folds;
     std::vector<int> particles;
-    for (const int i : line.points) particles.push_back(particle_[as_index(line.panel)][as_index(i)]);
+    for (const int i : line.points)
+      particles.push_back(particle_[as_index(line.panel)][as_index(i)]);
     if (!folds.empty() && folds.back().angle == line.angle &&
         folds.back().particles.back() == particles.front())
       folds.back().particles.insert(folds.back().particles.end(), particles.begin() + 1,

@@ -24,7 +24,7 @@ struct FoldSide {
 };
 
 std::map<Connection, std::vector<FoldSide>> sides_of(const RestShape& shape,
-                                           const std::map<Connection, double>& angles) {
+                                                     const std::map<Connection, double>& angles) {
   std::map<Connection, std::vector<FoldSide>> sides;
   for (std::size_t t = 0; t < shape.triangles.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
@@ -119,7 +119,8 @@ std::vector<Hinge> make_hinges(const RestShape& shape, const std::vector<Fold>& 
       const double at_first = s == 0 ? 1 - share : share;
       hinge.slope[0] -= at_first * slope;
       hinge.slope[1] -= (1 - at_first) * slope;
-      softness += kFoldWidth / 2 / rigidity_about(along, bend[static_cast<std::size_t>(panel_of(shape, t))]);
+      softness += kFoldWidth / 2 /
+                  rigidity_about(along, bend[static_cast<std::size_t>(panel_of(shape, t))]);
     }
     hinge.stiffness = length / softness;
     if (hinge.stiffness > 0) hinges.push_back(hinge);

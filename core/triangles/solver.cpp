@@ -264,7 +264,8 @@ class TriangleSolver : public SheetSolver {
     set_at(state_.x, state_.x_error, at, position_at(at) + by - origin_);
     set_at(state_.d, state_.d_error, at, exact(state_.d, state_.d_error, at) + in_step);
     for (std::size_t axis = 0; axis < 3; ++axis)
-      state_.w.data()[at + axis] += static_cast<T>(state_.lead * in_step[static_cast<Eigen::Index>(axis)]);
+      state_.w.data()[at + axis] +=
+          static_cast<T>(state_.lead * in_step[static_cast<Eigen::Index>(axis)]);
   }
   void put(AlignedArray<T>& plane, int particle, const Vector3d& values) {
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -343,7 +344,7 @@ std::unique_ptr<SheetSolver> make(const Mesh& mesh, const Dynamics& dynamics,
 std::unique_ptr<SheetSolver> make_triangle_solver(const Mesh& mesh, const Dynamics& dynamics,
                                                   const std::optional<Wind>& wind,
                                                   const SolverSettings& settings) {
-  if (settings.precision == Precision::kDouble) 
+  if (settings.precision == Precision::kDouble)
     return make<double>(mesh, dynamics, wind, false, settings.integrator);
   return make<float>(mesh, dynamics, wind, settings.compensated, settings.integrator);
 }

@@ -22,7 +22,7 @@ using google::protobuf::util::FieldMaskUtil;
 constexpr std::array kEvaluators = {Evaluator::kLinearized, Evaluator::kSeries, Evaluator::kExact,
                                     Evaluator::kLinearized, Evaluator::kPolynomial};
 constexpr std::array kIntegrators = {IntegratorKind::kVerlet, IntegratorKind::kVerlet,
-                                     IntegratorKind::kEuler, IntegratorKind::kMidpoint,
+                                     IntegratorKind::kEuler,  IntegratorKind::kMidpoint,
                                      IntegratorKind::kRk4,    IntegratorKind::kLaggedVerlet};
 constexpr std::array kLabTests = {LabTest::kTensile, LabTest::kTensile,    LabTest::kShear,
                                   LabTest::kBending, LabTest::kCantilever, LabTest::kChain,

@@ -20,9 +20,8 @@ class PatternReader {
     for (int p = 0; p < from.panels_size(); ++p)
       pattern.panels.push_back(panel(from.panels(p), join("pattern.panels[", p, "]")));
     for (const v1::PatternSeam& seam : from.seams())
-      pattern.seams.push_back(
-          {runs(seam.first_side()), runs(seam.second_side()), seam.same_direction(),
-           seam.fold_rad()});
+      pattern.seams.push_back({runs(seam.first_side()), runs(seam.second_side()),
+                               seam.same_direction(), seam.fold_rad()});
     return pattern;
   }
 

@@ -33,9 +33,8 @@ Vector3d angular_momentum(const Matrix3Xd& x, const Matrix3Xd& v) {
 }
 
 TEST(Conservation, FreeFallIsExactForEveryIntegratorButEuler) {
-  for (const auto integrator :
-       {IntegratorKind::kVerlet, IntegratorKind::kMidpoint, IntegratorKind::kRk4,
-        IntegratorKind::kLaggedVerlet}) {
+  for (const auto integrator : {IntegratorKind::kVerlet, IntegratorKind::kMidpoint,
+                                IntegratorKind::kRk4, IntegratorKind::kLaggedVerlet}) {
     SheetDefinition sheet = flat_sheet(4, 4);
     sheet.start_velocities = values(Vector3d(1, 2, 3).replicate(1, 16));
     Scene scene = floating(sheet);

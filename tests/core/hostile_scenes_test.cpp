@@ -180,9 +180,9 @@ TEST(HostileScene, AStepForcedTo100MillisecondsIsRefusedOrRepaired) {
 
 // Each integrator, forced to a step that is 20 times too long.
 TEST(HostileScene, EveryIntegratorIsRepaired) {
-  for (const auto kind : {IntegratorKind::kVerlet, IntegratorKind::kEuler,
-                          IntegratorKind::kMidpoint, IntegratorKind::kRk4,
-                          IntegratorKind::kLaggedVerlet}) {
+  for (const auto kind :
+       {IntegratorKind::kVerlet, IntegratorKind::kEuler, IntegratorKind::kMidpoint,
+        IntegratorKind::kRk4, IntegratorKind::kLaggedVerlet}) {
     SheetDefinition sheet = held(flat_sheet(5, 5));
     sheet.textile.damping = 0.05;
     Scene scene = scene_of(sheet);

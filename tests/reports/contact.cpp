@@ -198,8 +198,7 @@ void friction_angle(Page& page) {
     while (slides - holds > 0.005 * kDegree) {
       const double angle = (holds + slides) / 2;
       const Quaterniond turn(Eigen::AngleAxisd(-angle, Vector3d::UnitZ()));
-      const Collider incline =
-          testing::solid(testing::box_mesh({0.5, 0.1, 0.1}, turn), friction);
+      const Collider incline = testing::solid(testing::box_mesh({0.5, 0.1, 0.1}, turn), friction);
       constexpr double kSlides = 2e-5;  // m in 0.4 s: at 0.002 degrees more
       (testing::slide_on(incline, turn, {0.013, 0.101, 0.007}, 0.4) > kSlides ? slides : holds) =
           angle;

@@ -29,7 +29,8 @@ client::Points points_of(const Eigen::Ref<const Matrix3Xd>& x) {
 
 std::vector<std::uint32_t> indices_of(std::span<const std::array<int, 3>> triangles) {
   std::vector<std::uint32_t> indices;
-  for (const auto& triangle : triangles) indices.insert(indices.end(), triangle.begin(), triangle.end());
+  for (const auto& triangle : triangles)
+    indices.insert(indices.end(), triangle.begin(), triangle.end());
   return indices;
 }
 
@@ -42,8 +43,8 @@ client::Body body_of(const Collider& collider, double time) {
   const BodyMesh& mesh = std::get<SharedBody>(collider.shape)->mesh;
   client::Solid solid;
   solid.offset = offset;
-  solid.corners = points_of(Matrix3Xd::Map(mesh.vertices[0].data(), 3,
-                                           static_cast<Eigen::Index>(mesh.vertices.size())));
+  solid.corners = points_of(
+      Matrix3Xd::Map(mesh.vertices[0].data(), 3, static_cast<Eigen::Index>(mesh.vertices.size())));
   solid.triangles = indices_of(mesh.triangles);
   solid.normals = client::normals_of(solid.corners, solid.triangles);
   return solid;
@@ -64,7 +65,8 @@ void draw(const Simulation& simulation, const std::filesystem::path& path) {
     surface.triangles = indices_of(triangles_of(sheet.shape));
     surface.normals = client::normals_of(surface.points, surface.triangles);
     surface.values.resize(static_cast<std::size_t>(count));
-    surface.panels.resize(surface.triangles.size() / 3, static_cast<int>(stage.surfaces.size()) - 1);
+    surface.panels.resize(surface.triangles.size() / 3,
+                          static_cast<int>(stage.surfaces.size()) - 1);
     first += count;
   }
   for (const Collider& collider : scene.colliders)

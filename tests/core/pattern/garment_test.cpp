@@ -202,10 +202,9 @@ TEST(Garments, SidesOfSeamsHaveEqualCountsHoweverTheyAreDivided) {
 }
 
 TEST(Garments, ASeamPressedToAnAngleIsOneFoldAlongAllItsPanels) {
-  Pattern pattern{{rectangle("band", 0.5, 0.04), rectangle("left", 0.2, 0.3),
-                   rectangle("right", 0.3, 0.3)},
-                  {{{{"band", 0}}, {{"left", 2}, {"right", 2}}, false, -2.5},
-                   seam({"left", 1}, {"right", 3})}};
+  Pattern pattern{
+      {rectangle("band", 0.5, 0.04), rectangle("left", 0.2, 0.3), rectangle("right", 0.3, 0.3)},
+      {{{{"band", 0}}, {{"left", 2}, {"right", 2}}, false, -2.5}, seam({"left", 1}, {"right", 3})}};
   const Garment garment = built(pattern, 0.01);
   ASSERT_EQ(garment.mesh.folds.size(), 1);
   EXPECT_EQ(garment.mesh.folds[0].particles, garment.edges[0].particles);

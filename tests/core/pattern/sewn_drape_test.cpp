@@ -198,10 +198,9 @@ TEST(SewnDrape, APressedSeamTurnsAPanelToItsAngleOnTheSideThatIsMeant) {
         flap.origin = {0, 2 * kSeam, angle > 0 ? 0.03 : -0.03};
         flap.rotation = Eigen::AngleAxisd(pi, Vector3d::UnitX());
       }
-      const Garment garment =
-          sewn({{trapezoid_panel("base", 0, kWidth, kSeam, kWidth), flap},
-                {{{{"base", 2}}, {{"flap", 0}}, false, angle}}},
-               0.02);
+      const Garment garment = sewn({{trapezoid_panel("base", 0, kWidth, kSeam, kWidth), flap},
+                                    {{{{"base", 2}}, {{"flap", 0}}, false, angle}}},
+                                   0.02);
       Scene scene;
       scene.sheets = {cloth_of(garment, 1e-5)};
       for (const int i : garment.edges[0].particles) scene.sheets[0].pins.push_back({{i}, {}});
@@ -216,7 +215,8 @@ TEST(SewnDrape, APressedSeamTurnsAPanelToItsAngleOnTheSideThatIsMeant) {
         return Vector3d(sum / static_cast<double>(garment.edges[edge].particles.size()));
       };
       const Vector3d up = (middle(2) - middle(0)).normalized(), way = middle(6) - middle(2);
-      EXPECT_NEAR(std::atan2(way.dot(Vector3d::UnitX().cross(up)), way.dot(up)), angle, 0.1) << down;
+      EXPECT_NEAR(std::atan2(way.dot(Vector3d::UnitX().cross(up)), way.dot(up)), angle, 0.1)
+          << down;
     }
 }
 

@@ -18,9 +18,9 @@
 namespace weft::testing {
 namespace {
 
+using std::numbers::pi;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
-using std::numbers::pi;
 
 constexpr double kFoldHalf = 0.06, kFoldSpacing = 0.01;  // m
 constexpr BendStiffness kFoldBend{4e-6, 1e-6, 2.5e-6};
@@ -45,10 +45,10 @@ TriangleMesh folded_square(double angle, double turn = 0) {
 Matrix3Xd roof(const TriangleMesh& mesh, double angle) {
   const Triangles whole = complete(mesh);
   const auto& [a, b, c] = whole->triangles[0];
-  const Vector3d normal = (whole->start[static_cast<std::size_t>(b)] -
-                           whole->start[static_cast<std::size_t>(a)])
-                              .cross(whole->start[static_cast<std::size_t>(c)] -
-                                     whole->start[static_cast<std::size_t>(a)]);
+  const Vector3d normal =
+      (whole->start[static_cast<std::size_t>(b)] - whole->start[static_cast<std::size_t>(a)])
+          .cross(whole->start[static_cast<std::size_t>(c)] -
+                 whole->start[static_cast<std::size_t>(a)]);
   Matrix3Xd x(3, static_cast<Eigen::Index>(whole->start.size()));
   for (Eigen::Index i = 0; i < x.cols(); ++i) {
     const Vector3d& start = whole->start[static_cast<std::size_t>(i)];
@@ -106,7 +106,8 @@ TEST(Folds, HeldFlatTheyStoreTheEnergyOfAStripThatIsCurvedAtRest) {
     const double rigidity = kFoldBend.warp * c * c * c * c + kFoldBend.weft * s * s * s * s +
                             2 * kFoldBend.twist * c * c * s * s;
     const double expected = rigidity * kAngle * kAngle / (2 * kFoldWidth) * 2 * kFoldHalf;
-    EXPECT_NEAR(hinge_energy(surface_of_fold(mesh).hinges, roof(mesh, 0)), expected, 1e-4 * expected)
+    EXPECT_NEAR(hinge_energy(surface_of_fold(mesh).hinges, roof(mesh, 0)), expected,
+                1e-4 * expected)
         << turn;
   }
 }

@@ -162,7 +162,8 @@ const Feature kFeatures[] = {
        double angle = -3;
        for (const auto& [edge, triangles] : seen)
          if (triangles == 2 && (edge.first + edge.second) % 3 == 0)
-           mesh.folds.push_back({{edge.first, edge.second}, angle = angle > 2.5 ? -3 : angle + 0.7});
+           mesh.folds.push_back(
+               {{edge.first, edge.second}, angle = angle > 2.5 ? -3 : angle + 0.7});
        s.shape = std::make_shared<const TriangleMesh>(mesh);
      }},
     {"PanelsOfTheirOwnTextile",

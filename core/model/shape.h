@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <variant>
@@ -40,7 +39,7 @@ struct Fold {
   double angle = 0;
 };
 
-inline constexpr double kMostFold = std::numbers::pi;  // rad
+inline constexpr double kMostFold = 3.2;  // rad: beyond half a turn it is one to the other side
 
 // Triangles of any outline, and the flat shape that they were cut in.
 struct TriangleMesh {

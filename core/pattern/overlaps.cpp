@@ -10,9 +10,8 @@
 namespace weft {
 namespace {
 
-constexpr double kOnePlane =
-    1e-3;  // between planes, m: what is closer lies in none before the other
-constexpr double kParallel = 1e-3;  // between their normals, rad
+constexpr double kOnePlane = 1e-3;  // planes that are closer are one, m
+constexpr double kParallel = 1e-3;  // their normals, rad
 constexpr double kGap = 2e-3;       // left between panels that were moved apart, m
 constexpr int kMostRounds = 8;      // for panels that meet others where they are moved to
 

@@ -521,7 +521,7 @@ TEST(Garments, WhatCannotBeCutOrSewnIsRefusedByItsField) {
           {{good}, {seam({"front", 1}, {"front", 3}), seam({"front", 0}, {"front", 1, 0.5, 1})}}),
       "pattern.seams[1].second_side[0]");
   EXPECT_EQ(field_of({{good}, {{{}, {{"front", 1}}}}}), "pattern.seams[0].first_side");
-  EXPECT_EQ(field_of({{good}, {{{{"front", 1}}, {{"front", 3}}, false, 3.2}}}),
+  EXPECT_EQ(field_of({{good}, {{{{"front", 1}}, {{"front", 3}}, false, 3.3}}}),
             "pattern.seams[0].fold_rad");
   EXPECT_EQ(field_of({{panel("line", {line_to(1, 0)})}, {}}), "pattern.panels[0].edges");
   PatternPanel bad = good;

@@ -111,14 +111,14 @@ TEST_F(SessionAssets, HoldTheMeshesOfBodiesAsThoseOfSheets) {
   EXPECT_THAT(kept(), Not(HasSubstr(risen)));
   restart();
   EXPECT_EQ(service_->get(session).scene().colliders(0).mesh().asset(), name);
-  service_->step(session, 5);
+  const std::int64_t last = service_->step(session, 5).frame();
   EXPECT_EQ(delete_asset(assets(), name).reason(), "ASSET_USED");
 
   scene.mutable_colliders(0)->mutable_mesh()->set_asset(name);
   const v1::Session undisturbed = service_->create(scene);
-  service_->step(undisturbed, 25);
+  service_->step(undisturbed, last);
   const auto newest = [&](const v1::Session& of) {
-    return Stream(*service_, frames_of(of, 25, 25)).rest();
+    return Stream(*service_, frames_of(of, last, last)).rest();
   };
   expect_equal(newest(session), newest(undisturbed));
 }

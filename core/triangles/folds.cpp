@@ -1,6 +1,7 @@
 #include "core/triangles/folds.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <numeric>
 #include <utility>
@@ -47,7 +48,7 @@ struct CutShape {
   std::vector<int> original;  // which particle each is
 };
 
-CutShape cut_along(RestShape shape, const std::map<Connection, double>& edges) {
+CutShape cut_along(const RestShape& shape, const std::map<Connection, double>& edges) {
   CutShape cut{shape, {}};
   cut.original.resize(static_cast<std::size_t>(shape.particles));
   std::iota(cut.original.begin(), cut.original.end(), 0);

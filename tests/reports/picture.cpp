@@ -9,7 +9,6 @@
 #include "client/exports/normals.h"
 #include "client/render/tracer.h"
 #include "client/render/webp.h"
-#include "core/contact/moving_bodies.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::reports {

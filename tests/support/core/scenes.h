@@ -22,7 +22,7 @@ Scene floating(const SheetDefinition& sheet);
 // Fixed pseudo-random numbers in -1 ... 1.
 Matrix3Xd noise(int particles, unsigned seed = 1);
 
-// (3 x particles) of one sheet.
+// (3 x particles) of all sheets.
 Matrix3Xd positions(const Simulation& simulation);
 // FNV-1a over the bits of all values.
 std::uint64_t hash_of(const Matrix3Xd& values);

@@ -19,7 +19,9 @@ inline constexpr std::array kFolded = {2, 5, 60};  // as the paper's figure 7 ha
 inline constexpr std::array kAccuracies = {
     NamedAccuracy{"DRAFT", Accuracy::kDraft}, NamedAccuracy{"STANDARD", Accuracy::kStandard},
     NamedAccuracy{"FINE", Accuracy::kFine},
-    NamedAccuracy{"STANDARD, UNSHEARED", Accuracy::kStandard, StepBound::kUnsheared}};
+    NamedAccuracy{"STANDARD, UNSHEARED", Accuracy::kStandard, StepBound::kUnsheared},
+    NamedAccuracy{"the same, VERLET_LAGGED", Accuracy::kStandard, StepBound::kUnsheared,
+                  IntegratorKind::kLaggedVerlet}};
 
 // A setting and how far from the truth it ends.
 struct Point {

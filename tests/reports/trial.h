@@ -66,6 +66,7 @@ struct NamedAccuracy {
   const char* name;
   Accuracy accuracy;
   std::optional<StepBound> step_bound{};
+  std::optional<IntegratorKind> integrator{};
 };
 Outcome run(const Case& given, const NamedAccuracy& stated, int frames);
 

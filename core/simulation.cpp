@@ -58,8 +58,8 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   const std::int64_t settling = std::max<std::int64_t>(1, plan.step.substeps / kSettlings);
   const bool settles = is_relaxing() && relaxation->settling > 0;
   if (cloth_contact && unfinished->substeps == 0)
-    cloth_contact->untangle(
-        sheets, begin < end_of_untangling(scene) ? Untangling::speed_at(begin) : 0);
+    cloth_contact->untangle(sheets,
+                            begin < end_of_untangling(scene) ? Untangling::speed_at(begin) : 0);
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
     step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
     ++k;

@@ -33,8 +33,8 @@ class ClothContact {
   // found before is used, nor kept in memory.
   void forget();
   // Looks for cloth that has passed through cloth at the begin of a frame: until the next call such
-  // pairs do not keep each other apart, but are led apart at up to `speed`, m/s (untangling.h). At 0
-  // they stay so.
+  // pairs do not keep each other apart, but are led apart at up to `speed`, m/s (untangling.h). At
+  // 0 they stay so.
   void untangle(std::span<const MovingSheet> sheets, double speed);
   // Whether there are any.
   bool untangles() const { return !untangling_.empty(); }

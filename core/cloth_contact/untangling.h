@@ -12,11 +12,11 @@ namespace weft {
 // Leads apart cloth that has passed through cloth. Where an edge passes through a triangle, both
 // are moved so that the line along which the two surfaces meet becomes shorter (Volino and
 // Magnenat-Thalmann 2006), until there is none. That asks for no inside: borders, and lines that
-// do not close, are led apart too; but not a strip through a slit, or what is linked.
+// do not close, are led apart too; but what is linked, or a strip through a slit, may not be.
 class Untangling {
  public:
-  // How fast cloth is led apart at a time (s), m/s: ever faster, and again from the slowest on, once
-  // a second. What is taut holds on to slow ones; let go in between, it may give way elsewhere.
+  // How fast cloth is led apart at a time (s), m/s: each second ever faster, from the slowest on.
+  // Taut cloth resists what is slow; let go in between, it may give way elsewhere.
   static double speed_at(double time);
 
   explicit Untangling(const Cloth& cloth) : cloth_(cloth) {}

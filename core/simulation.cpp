@@ -21,6 +21,13 @@ NextStates& next_states(std::size_t sheets) {
   return states;
 }
 
+// m/s. Gently while garments are put on, for what holds them up is not to slip.
+double untangling_speed(const Scene& scene, double time) {
+  if (time >= end_of_untangling(scene)) return 0;
+  const double dressed = scene.dressing ? scene.dressing->end() : 0;
+  return Untangling::speed_at(std::max(0.0, time - dressed));
+}
+
 }  // namespace
 
 // One frame, or a part of one. It is attempted until the guard trusts it.
@@ -58,8 +65,7 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   const std::int64_t settling = std::max<std::int64_t>(1, plan.step.substeps / kSettlings);
   const bool settles = is_relaxing() && relaxation->settling > 0;
   if (cloth_contact && unfinished->substeps == 0)
-    cloth_contact->untangle(sheets,
-                            begin < end_of_untangling(scene) ? Untangling::speed_at(begin) : 0);
+    cloth_contact->untangle(sheets, untangling_speed(scene, begin));
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
     step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
     ++k;

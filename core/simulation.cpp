@@ -21,6 +21,13 @@ NextStates& next_states(std::size_t sheets) {
   return states;
 }
 
+// m/s. Gently while garments are put on, for what holds them up is not to slip.
+double untangling_speed(const Scene& scene, double time) {
+  if (time >= end_of_untangling(scene)) return 0;
+  const double dressed = scene.dressing ? scene.dressing->end() : 0;
+  return Untangling::speed_at(std::max(0.0, time - dressed));
+}
+
 }  // namespace
 
 // One frame, or a part of one. It is attempted until the guard trusts it.
@@ -58,7 +65,7 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   const std::int64_t settling = std::max<std::int64_t>(1, plan.step.substeps / kSettlings);
   const bool settles = is_relaxing() && relaxation->settling > 0;
   if (cloth_contact && unfinished->substeps == 0)
-    cloth_contact->untangle(sheets, begin < end_of_untangling(scene));
+    cloth_contact->untangle(sheets, untangling_speed(scene, begin));
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
     step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
     ++k;
@@ -217,9 +224,10 @@ bool Simulation::State::fail(const char* what, const std::string& reason) {
   return false;
 }
 
-// Whether nothing moved in the frame being computed, and no path is to come.
+// Whether nothing moved in the frame being computed, no path is to come, and nothing is led apart.
 bool Simulation::State::quiet(const NextStates& next) const {
   if (frame == 0 || time() + scene.solver.frame_step < rest_after) return false;
+  if (cloth_contact && cloth_contact->untangles()) return false;
   const Drive drive{scene.environment.gravity, 0, scene.solver.frame_step};
   for (std::size_t s = 0; s < sheets.size(); ++s)
     if (!is_quiet(sheets[s].mesh, sheets[s].dynamics.inverse_mass, drive,

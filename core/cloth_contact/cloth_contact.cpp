@@ -150,14 +150,14 @@ void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame) {
   write(sheets);
 }
 
-void ClothContact::untangle(std::span<const MovingSheet> sheets, bool wanted) {
+void ClothContact::untangle(std::span<const MovingSheet> sheets, double speed) {
   const bool was_empty = untangling_.empty();
   untangling_.clear();
-  if (wanted) {
+  if (speed > 0) {
     Matrix3Xd x;
     cloth_.join([&](std::size_t s) -> const Matrix3Xd& { return sheets[s].good().x; }, x);
     lists_.blocks().set(x);
-    untangling_.find(lists_.blocks(), x);
+    untangling_.find(lists_.blocks(), x, speed);
   }
   if (!was_empty || !untangling_.empty()) forget();
 }

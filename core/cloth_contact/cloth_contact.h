@@ -32,9 +32,12 @@ class ClothContact {
   // Sheets may be anywhere now, or be held otherwise, at the begin of a frame. Nothing that was
   // found before is used, nor kept in memory.
   void forget();
-  // Looks for cloth that has passed through cloth at the begin of a frame, or has it stay so: until
-  // the next call such pairs do not keep each other apart, but are led apart (untangling.h).
-  void untangle(std::span<const MovingSheet> sheets, bool wanted);
+  // Looks for cloth that has passed through cloth at the begin of a frame: until the next call such
+  // pairs do not keep each other apart, but are led apart at up to `speed`, m/s (untangling.h). At
+  // 0 they stay so.
+  void untangle(std::span<const MovingSheet> sheets, double speed);
+  // Whether there are any.
+  bool untangles() const { return !untangling_.empty(); }
   // Of sheets that have taken a step of dt, s.
   void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame);
 

@@ -8,12 +8,17 @@
 
 namespace weft {
 
+double Untangling::speed_at(double time) {
+  constexpr double kSlowest = 1, kDoublings = 3;
+  return kSlowest * std::exp2(kDoublings * (time - std::floor(time)));
+}
+
 void Untangling::clear() {
   pairs_.clear();
   at_cut_.clear();
 }
 
-void Untangling::find(NearBlocks& near, const Matrix3Xd& x) {
+void Untangling::find(NearBlocks& near, const Matrix3Xd& x, double speed) {
   clear();
   const std::vector<ClothPair> cuts = find_cuts(cloth_, near, x);
   if (cuts.empty()) return;
@@ -22,7 +27,7 @@ void Untangling::find(NearBlocks& near, const Matrix3Xd& x) {
     for (const int i : cloth_.triangles[t])
       around[static_cast<std::size_t>(i)].push_back(static_cast<int>(t));
   at_cut_.resize(around.size());
-  for (const auto& [edge, triangle] : cuts) add(edge, triangle, around, x);
+  for (const auto& [edge, triangle] : cuts) add(edge, triangle, around, x, speed);
 }
 
 bool Untangling::has(const std::array<int, 4>& particles) const {
@@ -31,8 +36,8 @@ bool Untangling::has(const std::array<int, 4>& particles) const {
   });
 }
 
-void Untangling::add(int edge, int triangle, const Around& around, const Matrix3Xd& x) {
-  constexpr double kSpeed = 1;       // m/s
+void Untangling::add(int edge, int triangle, const Around& around, const Matrix3Xd& x,
+                     double speed) {
   constexpr double kHalfTurn = 0.2;  // of the line where the speed is half of that
   const auto& [p, q] = cloth_.edges[static_cast<std::size_t>(edge)];
   const std::array<int, 3> corners = cloth_.triangles[static_cast<std::size_t>(triangle)];
@@ -68,7 +73,7 @@ void Untangling::add(int edge, int triangle, const Around& around, const Matrix3
   pairs_.push_back({{p, q, a, b, c},
                     {1 - share, share, v + w - 1, -v, -w},
                     way / turn,
-                    kSpeed * turn / std::hypot(turn, kHalfTurn)});
+                    speed * turn / std::hypot(turn, kHalfTurn)});
 }
 
 void Untangling::lead(std::span<MovingSheet> sheets, double dt) const {

@@ -12,13 +12,18 @@ namespace weft {
 // Leads apart cloth that has passed through cloth. Where an edge passes through a triangle, both
 // are moved so that the line along which the two surfaces meet becomes shorter (Volino and
 // Magnenat-Thalmann 2006), until there is none. That asks for no inside: borders, and lines that
-// do not close, are led apart too; but not a strip through a slit, or what is linked.
+// do not close, are led apart too; but what is linked, or a strip through a slit, may not be.
 class Untangling {
  public:
+  // How fast cloth is led apart at a time (s), m/s: each second ever faster, from the slowest on.
+  // Taut cloth resists what is slow; let go in between, it may give way elsewhere.
+  static double speed_at(double time);
+
   explicit Untangling(const Cloth& cloth) : cloth_(cloth) {}
 
-  // Looks for cuts at x, (3 x particles) m, where `near` has its boxes.
-  void find(NearBlocks& near, const Matrix3Xd& x);
+  // Looks for cuts at x, (3 x particles) m, where `near` has its boxes. They are led apart at up to
+  // `speed`, m/s.
+  void find(NearBlocks& near, const Matrix3Xd& x, double speed);
   void clear();
   bool empty() const { return pairs_.empty(); }
   // Whether all of these particles are at cuts: what they are to keep apart may be on wrong sides.
@@ -37,7 +42,7 @@ class Untangling {
   };
 
   using Around = std::vector<std::vector<int>>;  // triangles of each particle
-  void add(int edge, int triangle, const Around& around, const Matrix3Xd& x);
+  void add(int edge, int triangle, const Around& around, const Matrix3Xd& x, double speed);
 
   const Cloth& cloth_;
   std::vector<Pair> pairs_;

@@ -101,23 +101,60 @@ TEST(Untangling, ARollThatHasGoneThroughItselfComesApart) {
   EXPECT_EQ(cuts_of(simulation), 0);
 }
 
-// What is farther than 4 cm from the other is pinned, and the rest does not bend easily.
-TEST(Untangling, SwatchesThatAreHeldComeApart) {
-  Scene scene = crossing(10);
+// What is farther from the other one than `free` (m) is pinned.
+void pin_far_away(double free, Scene& scene) {
   for (std::size_t s = 0; s < 2; ++s) {
     SheetDefinition& sheet = scene.sheets[s];
-    auto& textile = std::get<MeasuredTextile>(sheet.textile.model);
-    textile.bend_rigidity_warp = textile.bend_rigidity_weft = 1e-4;
     const Matrix3Xd x = start_positions(sheet), other = start_positions(scene.sheets[1 - s]);
     Pin& pin = sheet.pins.emplace_back();
     for (int i = 0; i < sheet.particle_count(); ++i)
-      if ((other.colwise() - x.col(i)).colwise().norm().minCoeff() > 0.04)
+      if ((other.colwise() - x.col(i)).colwise().norm().minCoeff() > free)
         pin.particles.push_back(i);
   }
+}
+
+// Of cloth that does not bend easily.
+Scene stiff_crossing(double tensile) {
+  Scene scene = crossing(10);
+  for (SheetDefinition& sheet : scene.sheets) {
+    auto& textile = std::get<MeasuredTextile>(sheet.textile.model);
+    textile.tensile_warp = textile.tensile_weft = tensile;
+    textile.bend_rigidity_warp = textile.bend_rigidity_weft = 1e-4;
+  }
+  return scene;
+}
+
+TEST(Untangling, SwatchesThatAreHeldComeApart) {
+  Scene scene = stiff_crossing(200);
+  pin_far_away(0.04, scene);
   Simulation simulation(scene);
   EXPECT_GT(cuts_of(simulation), 10);
   go_on(simulation, 60);
   EXPECT_EQ(cuts_of(simulation), 0);
+}
+
+TEST(Untangling, SwatchesThatAreHeldTautComeApart) {
+  Scene scene = stiff_crossing(2000);
+  pin_far_away(0.02, scene);
+  Simulation simulation(scene);
+  EXPECT_GT(cuts_of(simulation), 10);
+  for (int frame = 0; frame < 180 && cuts_of(simulation) > 0; ++frame) go_on(simulation, 1);
+  EXPECT_EQ(cuts_of(simulation), 0);
+}
+
+TEST(Untangling, NothingRestsWhileItIsLedApart) {
+  constexpr int kEnd = 90;  // frames
+  Scene scene = crossing(1.5);
+  for (SheetDefinition& sheet : scene.sheets) sheet.textile.damping_ratio = 0.05;
+  pin_far_away(0.005, scene);
+  Simulation simulation(scene);
+  for (int frame = 1; frame <= kEnd; ++frame) {
+    go_on(simulation, 1);
+    ASSERT_FALSE(simulation.at_rest()) << "frame " << frame;
+  }
+  EXPECT_GT(cuts_of(simulation), 0);
+  go_on(simulation, 60);
+  EXPECT_TRUE(simulation.at_rest());
 }
 
 TEST(Untangling, KeepsMomentum) {

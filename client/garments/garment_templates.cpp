@@ -322,7 +322,7 @@ v1::Pattern dress(const DressForm& form) {
 // A collar whose fall comes down over its stand. It starts outside of front and back, turned down:
 // closed, it could not turn over.
 void add_collar(Draft& draft, const Bodice& b, const Surroundings& body) {
-  constexpr double kStand = 0.03, kFall = 0.045, kWider = 0.014, kTurned = 3;
+  constexpr double kStand = 0.03, kFall = 0.045, kWider = 0.022, kTurned = 3;
   for (const bool front : {true, false}) {
     const std::string name = front ? "front" : "back";
     const Outline bodice = bodice_outline(b, front);
@@ -351,7 +351,6 @@ v1::Pattern shirt(const DressForm& form) {
   Bodice b = bodice_for(form, body, 0.12);
   b.hem = form.girth("hip").height - 0.03;
   b.hem_half = std::max(b.chest_half, (form.girth("hip").wanted + 0.06) / 4);
-  b.neck_half -= 0.01;
   b.front_neck = 0.075;
   add_bodice(draft, b, body);
   const double half = upper_arm_half(form, 0.12);

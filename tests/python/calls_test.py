@@ -323,7 +323,7 @@ class Plain(unittest.TestCase):
         built = self.server.build_garment(tube, 0.02)
         self.assertEqual(list(built.edges[1].particles), list(built.edges[3].particles)[::-1])
         sheet = weft.Sheet.from_proto(built.sheet)
-        fold, = sheet.shape.mesh.folds
+        fold, = sheet.shape.source.folds
         self.assertEqual(list(fold.particles), list(built.creases[0].particles))
         sheet.textile = weft.Textile.preset("denim_11oz")
         self.server.check(weft.Scene([sheet]))

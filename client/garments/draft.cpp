@@ -125,10 +125,11 @@ void Draft::add_runs(const Side& side,
   }
 }
 
-void Draft::sew(const Side& first, const Side& second) {
+void Draft::sew(const Side& first, const Side& second, double fold_rad) {
   v1::PatternSeam* seam = pattern_.add_seams();
   add_runs(first, *seam->mutable_first_side());
   add_runs(second, *seam->mutable_second_side());
+  seam->set_fold_rad(fold_rad);
 }
 
 }  // namespace weft::client

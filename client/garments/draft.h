@@ -61,8 +61,8 @@ class Draft {
     std::string panel;
     std::vector<std::string> labels;  // along the seam
   };
-  // Sides that run against each other, as panels do that lie side by side.
-  void sew(const Side& first, const Side& second);
+  // Sides that run against each other, as panels do that lie side by side, pressed to an angle.
+  void sew(const Side& first, const Side& second, double fold_rad = 0);
 
   v1::Pattern take() { return std::move(pattern_); }
 

@@ -319,28 +319,43 @@ v1::Pattern dress(const DressForm& form) {
   return draft.take();
 }
 
+// A collar whose fall comes down over its stand. It starts outside of front and back, turned down:
+// closed, it could not turn over.
+void add_collar(Draft& draft, const Bodice& b, const Surroundings& body) {
+  constexpr double kStand = 0.03, kFall = 0.045, kWider = 0.022, kTurned = 3;
+  for (const bool front : {true, false}) {
+    const std::string name = front ? "front" : "back";
+    const Outline bodice = bodice_outline(b, front);
+    const double half = bodice.length("neck") / 2, low = b.neck + 0.01, roll = low + kStand;
+    const auto place = front ? front_of : back_of;
+    const Outline stand = band_outline(half, low, kStand, front),
+                  fall =
+                      trapezoid("lower", roll, half, "upper", roll + kFall, half + kWider, front);
+    draft.add("stand-" + name, stand, place(stand, body), std::numbers::pi / 2);
+    PanelPlace turned = place(bodice, body);
+    turned.origin += Vector3d(0, 2 * roll, front ? kClear : -kClear);
+    turned.rotation = Eigen::AngleAxisd(std::numbers::pi, Vector3d::UnitX()) * turned.rotation;
+    draft.add("fall-" + name, fall, turned, std::numbers::pi / 2);
+    draft.sew({name, {"neck"}}, {"stand-" + name, {"lower"}});
+    draft.sew({"stand-" + name, {"upper"}}, {"fall-" + name, {"lower"}}, kTurned);
+  }
+  for (const std::string side : kSides)
+    for (const std::string part : {"stand-", "fall-"})
+      draft.sew({part + "front", {of_side("side", side)}},
+                {part + "back", {of_side("side", side)}});
+}
+
 v1::Pattern shirt(const DressForm& form) {
-  constexpr double kCollar = 0.04;
   const Surroundings body(form);
   Draft draft;
   Bodice b = bodice_for(form, body, 0.12);
   b.hem = form.girth("hip").height - 0.03;
   b.hem_half = std::max(b.chest_half, (form.girth("hip").wanted + 0.06) / 4);
-  b.neck_half -= 0.01;
   b.front_neck = 0.075;
   add_bodice(draft, b, body);
   const double half = upper_arm_half(form, 0.12);
   add_sleeves(draft, form, b, {half, 0.62 * half, form.arm.length - 0.22});
-  for (const bool front : {true, false}) {
-    const std::string name = front ? "front" : "back";
-    const double neck = bodice_outline(b, front).length("neck");
-    const Outline collar = band_outline(neck / 2, b.neck + 0.01, kCollar, front);
-    draft.add("collar-" + name, collar, (front ? front_of : back_of)(collar, body),
-              std::numbers::pi / 2);
-    draft.sew({name, {"neck"}}, {"collar-" + name, {"lower"}});
-  }
-  for (const std::string side : kSides)
-    draft.sew({"collar-front", {of_side("side", side)}}, {"collar-back", {of_side("side", side)}});
+  add_collar(draft, b, body);
   return draft.take();
 }
 
@@ -461,7 +476,7 @@ const std::vector<Template>& all_templates() {
       {{"dress", "A dress to the knee: a fitted top with sleeves, a gathered skirt",
         "wool_tropical"},
        dress},
-      {{"shirt", "A loose shirt with long sleeves and a stand-up collar, without an opening",
+      {{"shirt", "A loose shirt with long sleeves and a collar that falls, without an opening",
         kUsualTextile},
        shirt},
   };

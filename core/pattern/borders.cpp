@@ -2,16 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include "core/model/text.h"
+#include "core/pattern/creases.h"
 #include "core/pattern/sets.h"
 #include "core/pattern/symmetry.h"
 
 namespace weft {
 namespace {
+
+constexpr double kMiddle = 0.5;       // of an edge
+constexpr double kNegligible = 0.25;  // what is shorter may become a point, in edges of triangles
 
 // Between neighbouring breaks of an edge.
 struct Piece {
@@ -75,10 +81,14 @@ class Cutter {
     for (std::size_t p = 0; p < pattern.panels.size(); ++p) {
       panel_numbers_[pattern.panels[p].name] = static_cast<int>(p);
       outlines_.push_back(outline_of(pattern.panels[p]));
+      breaks_.emplace_back(outlines_[p].size());
       middles_.emplace_back(outlines_[p].size());
-      for (const int e : mirrored_onto_themselves(outlines_[p], pattern.panels[p].grain))
+      for (const int e : mirrored_onto_themselves(outlines_[p], pattern.panels[p].grain)) {
         middles_[p][as_index(e)] = true;
+        breaks_[p][as_index(e)] = {kMiddle};
+      }
     }
+    end_creases();
     pieces_of_.resize(outlines_.size());
     for (std::size_t p = 0; p < outlines_.size(); ++p) pieces_of_[p].resize(outlines_[p].size());
   }
@@ -89,6 +99,7 @@ class Cutter {
     order_pieces();
     count_lines();
     make_points();
+    make_creases();
     turn_panels();
     note_edges();
     return std::move(borders_);
@@ -111,7 +122,52 @@ class Cutter {
                 label.empty() ? "" : " (" + label + ")");
   }
 
-  // Ends of runs, and middles of edges that a panel's mirror axis passes.
+  // Where creases end by the outline: at an end of an edge or of a run, or in the middle, where
+  // that is near.
+  void end_creases() {
+    std::vector<std::vector<std::vector<double>>> ends(breaks_);
+    for (auto& panel : ends)
+      for (auto& edge : panel) edge.insert(edge.end(), {0, 1});
+    for (const PatternSeam& seam : pattern_.seams)
+      for (const auto* runs : {&seam.first, &seam.second})
+        for (const EdgeRun& run : *runs) {
+          auto& known = ends[as_index(panel_numbers_.at(run.panel))][as_index(run.edge)];
+          known.insert(known.end(), {run.begin, run.end});
+        }
+    crease_ends_.resize(outlines_.size());
+    for (std::size_t p = 0; p < outlines_.size(); ++p)
+      for (const PatternCrease& crease : pattern_.panels[p].creases)
+        for (const Vector2d& end : {crease.points.front(), crease.points.back()}) {
+          auto& place =
+              crease_ends_[p].emplace_back(nearest_place(outlines_[p], end, edge_ * kNegligible));
+          if (!place) continue;
+          auto& known = ends[p][as_index(place->edge)];
+          const double near = edge_ * kNegligible / outlines_[p][as_index(place->edge)].length();
+          const auto apart = [&](double share) { return std::abs(share - place->share); };
+          const double nearest = *std::ranges::min_element(known, {}, apart);
+          if (apart(nearest) < near) {
+            place->share = nearest;
+            continue;
+          }
+          known.push_back(place->share);
+          breaks_[p][as_index(place->edge)].push_back(place->share);
+        }
+    for (auto& panel : breaks_)
+      for (auto& edge : panel) std::sort(edge.begin(), edge.end());
+  }
+
+  // Breaks of an edge between two shares of it.
+  std::vector<double> breaks_between(int panel, int edge, double from, double to) const {
+    constexpr double kClear = 0.02;  // a middle is no break so near to an end
+    std::vector<double> found;
+    for (const double share : breaks_[as_index(panel)][as_index(edge)]) {
+      const double clear = share == kMiddle ? kClear : kRunGap;
+      if (share > from + clear && share < to - clear) found.push_back(share);
+    }
+    return found;
+  }
+
+  // Ends of runs, middles of edges that a panel's mirror axis passes, and ends of creases.
   std::vector<Break> breaks_of(const std::vector<EdgeRun>& runs, bool backwards) const {
     double whole = 0, along = 0;
     for (const EdgeRun& run : runs) whole += curve(run).length() * (run.end - run.begin);
@@ -122,11 +178,12 @@ class Cutter {
       const double begin = backwards ? run.end : run.begin, end = backwards ? run.begin : run.end;
       const int number = static_cast<int>(r);
       breaks.push_back({number, begin, along / whole});
-      constexpr double kMiddle = 0.5, kClear = 0.02;
-      if (middles_[as_index(panel_numbers_.at(run.panel))][as_index(run.edge)] &&
-          run.begin < kMiddle - kClear && run.end > kMiddle + kClear)
+      std::vector<double> inner =
+          breaks_between(panel_numbers_.at(run.panel), run.edge, run.begin, run.end);
+      if (backwards) std::reverse(inner.begin(), inner.end());
+      for (const double share : inner)
         breaks.push_back(
-            {number, kMiddle, (along + length * (kMiddle - begin) / (end - begin)) / whole});
+            {number, share, (along + length * (share - begin) / (end - begin)) / whole});
       along += length;
     }
     breaks.push_back({static_cast<int>(runs.size()), 0, 1});
@@ -218,13 +275,12 @@ class Cutter {
   }
 
   void add_free(int panel, int edge, double from, double to) {
-    const double middle = 0.5;
-    if (middles_[as_index(panel)][as_index(edge)] && from < middle && to > middle) {
-      add_piece(panel, edge, from, middle);
-      add_piece(panel, edge, middle, to);
-    } else {
-      add_piece(panel, edge, from, to);
-    }
+    for (const double share : breaks_[as_index(panel)][as_index(edge)])
+      if (share > from && share < to) {
+        add_piece(panel, edge, from, share);
+        from = share;
+      }
+    add_piece(panel, edge, from, to);
   }
 
   // Around each panel.
@@ -267,7 +323,7 @@ class Cutter {
 
   // Whether it may become a point, with what has become one beside it.
   bool is_negligible(int piece) const {
-    const double most = edge_ / 4;
+    const double most = edge_ * kNegligible;
     const auto all = [&](int k) {
       const auto& ring = around_[as_index(pieces_[as_index(k)].panel)];
       const Piece& own = pieces_[as_index(k)];
@@ -347,7 +403,7 @@ class Cutter {
 
   void make_points() {
     borders_.panels.resize(outlines_.size());
-    std::vector<std::vector<int>> points(pieces_.size());  // of each, from start to end
+    points_of_.resize(pieces_.size());
     for (std::size_t p = 0; p < outlines_.size(); ++p) {
       Border& border = borders_.panels[p];
       const auto& ring = around_[p];
@@ -358,25 +414,25 @@ class Cutter {
         const std::size_t at = (begin + n) % ring.size();
         const Piece& piece = pieces_[as_index(ring[at])];
         const Piece& before = pieces_[as_index(ring[(at + ring.size() - 1) % ring.size()])];
-        if (before.count > 0) border.points.push_back(without_dust(joint(ring, at)));
-        auto& own = points[as_index(ring[at])];
-        own.push_back(static_cast<int>(border.points.size()) - 1);
+        if (before.count > 0) border.lines.border.push_back(without_dust(joint(ring, at)));
+        auto& own = points_of_[as_index(ring[at])];
+        own.push_back(static_cast<int>(border.lines.border.size()) - 1);
         const Curve& line = curve(piece.panel, piece.edge);
         for (int i = 1; i < piece.count; ++i) {
           const double part = static_cast<double>(i) / piece.count;
-          own.push_back(static_cast<int>(border.points.size()));
-          border.points.push_back(
+          own.push_back(static_cast<int>(border.lines.border.size()));
+          border.lines.border.push_back(
               without_dust(line.at(piece.from + part * (piece.to - piece.from))));
         }
       }
-      const int count = static_cast<int>(border.points.size());
+      const int count = static_cast<int>(border.lines.border.size());
       for (const int k : ring)
         if (pieces_[as_index(k)].count > 0)
-          points[as_index(k)].push_back((points[as_index(k)].back() + 1) % count);
+          points_of_[as_index(k)].push_back((points_of_[as_index(k)].back() + 1) % count);
       for (const auto& of_edge : pieces_of_[p]) {
         std::vector<int>& line = border.edges.emplace_back();
         for (const int k : of_edge)
-          for (const int i : points[as_index(k)])
+          for (const int i : points_of_[as_index(k)])
             if (line.empty() || line.back() != i) line.push_back(i);
       }
     }
@@ -384,12 +440,54 @@ class Cutter {
       const Piece& piece = pieces_[k];
       if (piece.partner < static_cast<int>(k)) continue;
       const Piece& other = pieces_[as_index(piece.partner)];
-      std::vector<int> there = points[as_index(piece.partner)];
+      std::vector<int> there = points_of_[as_index(piece.partner)];
       if (piece.reversed) std::reverse(there.begin(), there.end());
       for (std::size_t i = 0; i < there.size(); ++i)
-        borders_.sewn.push_back({{piece.panel, points[k][i]}, {other.panel, there[i]}});
+        borders_.sewn.push_back({{piece.panel, points_of_[k][i]}, {other.panel, there[i]}});
       if (piece.fold != 0 && piece.count > 0)
-        borders_.folds.push_back({piece.panel, points[k], piece.fold});
+        borders_.folds.push_back({piece.panel, points_of_[k], piece.fold});
+    }
+  }
+
+  // The border's point where a crease ends.
+  int point_at(std::size_t p, const OutlinePlace& place) const {
+    int nearest = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (const int k : pieces_of_[p][as_index(place.edge)]) {
+      const Piece& piece = pieces_[as_index(k)];
+      for (const auto& [share, point] : {std::pair(piece.from, points_of_[as_index(k)].front()),
+                                         std::pair(piece.to, points_of_[as_index(k)].back())})
+        if (std::abs(share - place.share) < least)
+          least = std::abs(share - place.share), nearest = point;
+    }
+    return nearest;
+  }
+
+  void make_creases() {
+    for (std::size_t p = 0; p < outlines_.size(); ++p) {
+      const PatternPanel& panel = pattern_.panels[p];
+      if (panel.creases.empty()) continue;
+      PanelLines& lines = borders_.panels[p].lines;
+      const auto mirror = is_square(panel.grain) ? find_mirror(lines.border) : std::nullopt;
+      const auto axis = mirror ? std::optional(mirror->axis) : std::nullopt;
+      for (std::size_t c = 0; c < panel.creases.size(); ++c) {
+        const auto &first = crease_ends_[p][2 * c], &last = crease_ends_[p][2 * c + 1];
+        std::vector<Vector2d> points = panel.creases[c].points;
+        std::vector<int>& crease = lines.creases.emplace_back();
+        if (first) {
+          crease.push_back(point_at(p, *first));
+          points.front() = lines.point(crease[0]);
+        }
+        const int end = last ? point_at(p, *last) : -1;
+        if (last) points.back() = lines.point(end);
+        points = follow(points, edge_, axis);
+        const std::size_t count = points.size() - (last ? 1 : 0);
+        for (std::size_t i = crease.size(); i < count; ++i) {
+          crease.push_back(static_cast<int>(lines.border.size() + lines.inside.size()));
+          lines.inside.push_back(without_dust(points[i]));
+        }
+        if (last) crease.push_back(end);
+      }
     }
   }
 
@@ -467,10 +565,13 @@ class Cutter {
   std::string field_;
   std::map<std::string, int> panel_numbers_;
   std::vector<std::vector<Curve>> outlines_;
-  std::vector<std::vector<bool>> middles_;  // edges that are broken in the middle
+  std::vector<std::vector<std::vector<double>>> breaks_;  // of each edge within it, by shares
+  std::vector<std::vector<bool>> middles_;                // edges that are broken in the middle
+  std::vector<std::vector<std::optional<OutlinePlace>>> crease_ends_;  // two of each crease
   std::vector<Piece> pieces_;
   std::vector<std::vector<std::vector<int>>> pieces_of_;  // of each edge of each panel
   std::vector<std::vector<int>> around_;                  // of each panel
+  std::vector<std::vector<int>> points_of_;               // of each piece, from start to end
   std::vector<std::size_t> place_;                        // of each piece in around_
   std::vector<Link> links_;
   Borders borders_;

@@ -4,13 +4,14 @@
 #include <vector>
 
 #include "core/pattern/curve.h"
+#include "core/pattern/panel_lines.h"
 #include "core/plan.h"
 
 namespace weft {
 
-// The outline of a panel as triangles have it.
+// The outline and the creases of a panel as triangles have them.
 struct Border {
-  std::vector<Vector2d> points;         // anticlockwise, m
+  PanelLines lines;
   std::vector<std::vector<int>> edges;  // points of each of the panel's edges, from start to end
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -9,6 +10,7 @@
 
 #include "core/model/text.h"
 #include "core/pattern/borders.h"
+#include "core/pattern/creases.h"
 #include "core/pattern/overlaps.h"
 #include "core/pattern/panel_mesher.h"
 #include "core/pattern/sets.h"
@@ -33,7 +35,7 @@ class Builder {
     check_borders();
     if (!problems_.empty()) return std::move(problems_);
     for (std::size_t p = 0; p < borders_.panels.size(); ++p)
-      meshes_.push_back(mesh_panel(borders_.panels[p].points, pattern_.panels[p].grain, edge_));
+      meshes_.push_back(mesh_panel(borders_.panels[p].lines, pattern_.panels[p].grain, edge_));
     number_points();
     part_doubles();
     if (!problems_.empty()) return std::move(problems_);
@@ -54,10 +56,10 @@ class Builder {
   void check_borders() {
     double particles = 0;
     for (std::size_t p = 0; p < borders_.panels.size(); ++p) {
-      const auto& points = borders_.panels[p].points;
+      const auto& points = borders_.panels[p].lines.border;
       const double area = area_within(points), count = static_cast<double>(points.size());
       particles += count / 2 + std::max(0.0, area) / (edge_ * edge_ * std::numbers::sqrt3 / 2);
-      if (const auto crossing = find_crossing(points))
+      if (const auto crossing = find_crossing({.border = points}))
         tell_crossing(p, *crossing);
       else if (area <= 0)
         problems_.push_back(
@@ -68,12 +70,18 @@ class Builder {
       problems_.push_back(
           {edge_field_, join("of ", edge_, " m makes about ", static_cast<long>(particles),
                              " particles, more than ", static_cast<long>(kMostParticles))});
+    if (!problems_.empty()) return;
+    for (std::size_t p = 0; p < borders_.panels.size(); ++p) {
+      auto found = crease_problems(pattern_.panels[p], borders_.panels[p], edge_, at_panel(p));
+      std::move(found.begin(), found.end(), std::back_inserter(problems_));
+    }
   }
 
   void tell_crossing(std::size_t p, const std::pair<int, int>& lines) {
-    const auto& border = borders_.panels[p];
+    const Border& border = borders_.panels[p];
+    const std::vector<Vector2d>& points = border.lines.border;
     const auto edge_of = [&](int line) {
-      const int next = (line + 1) % static_cast<int>(border.points.size());
+      const int next = (line + 1) % static_cast<int>(points.size());
       for (std::size_t e = 0; e < border.edges.size(); ++e)
         for (std::size_t i = 0; i + 1 < border.edges[e].size(); ++i)
           if (border.edges[e][i] == line && border.edges[e][i + 1] == next) return e;
@@ -83,7 +91,7 @@ class Builder {
     problems_.push_back({at_panel(p) + ".edges",
                          join("cross or touch in panel ", pattern_.panels[p].name, ": edge ", first,
                               " and ", first == second ? "itself" : join("edge ", second), " near ",
-                              place(border.points[as_index(lines.first)]),
+                              place(points[as_index(lines.first)]),
                               " m, where they are followed by lines of ", edge_, " m")});
   }
 
@@ -158,11 +166,17 @@ class Builder {
         mesh.triangles.push_back({middle, to, tip});
         break;
       }
+    for (std::vector<int>& crease : borders_.panels[p].lines.creases)
+      for (std::size_t i = 1; i < crease.size(); ++i)
+        if (std::minmax(crease[i - 1], crease[i]) == std::minmax(a, b)) {
+          crease.insert(crease.begin() + static_cast<std::ptrdiff_t>(i), middle);
+          break;
+        }
   }
 
   void note_corners() {
     for (std::size_t p = 0; p < meshes_.size(); ++p) {
-      const auto& points = borders_.panels[p].points;
+      const auto& points = borders_.panels[p].lines.border;
       const auto& edges = borders_.panels[p].edges;
       const std::size_t count = points.size();
       std::set<int> told;
@@ -229,22 +243,37 @@ class Builder {
       add_edges(p);
     }
     for (std::size_t i = 0; i < mesh.start.size(); ++i) mesh.start[i] /= shares[i];
-    for (const BorderFold& line : borders_.folds) add_fold(line);
+    for (const auto& [panel, points, angle] : borders_.folds)
+      add_fold(particles_of(as_index(panel), points), angle);
+    for (std::size_t p = 0; p < meshes_.size(); ++p) add_creases(p);
     if (mesh.flat_triangles == mesh.triangles) mesh.flat_triangles.clear();
   }
 
   // One with that before it where it goes on from there.
-  void add_fold(const BorderFold& line) {
+  void add_fold(const std::vector<int>& particles, double angle) {
     std::vector<Fold>& folds = garment_.mesh.folds;
-    std::vector<int> particles;
-    for (const int i : line.points)
-      particles.push_back(particle_[as_index(line.panel)][as_index(i)]);
-    if (!folds.empty() && folds.back().angle == line.angle &&
+    if (!folds.empty() && folds.back().angle == angle &&
         folds.back().particles.back() == particles.front())
       folds.back().particles.insert(folds.back().particles.end(), particles.begin() + 1,
                                     particles.end());
     else
-      folds.push_back({std::move(particles), line.angle});
+      folds.push_back({particles, angle});
+  }
+
+  void add_creases(std::size_t p) {
+    const auto& creases = borders_.panels[p].lines.creases;
+    for (std::size_t c = 0; c < creases.size(); ++c) {
+      const GarmentCrease& crease = garment_.creases.emplace_back(
+          GarmentCrease{static_cast<int>(p), static_cast<int>(c), particles_of(p, creases[c])});
+      if (const double angle = pattern_.panels[p].creases[c].angle; angle != 0)
+        add_fold(crease.particles, angle);
+    }
+  }
+
+  std::vector<int> particles_of(std::size_t p, const std::vector<int>& points) const {
+    std::vector<int> particles;
+    for (const int i : points) particles.push_back(particle_[p][as_index(i)]);
+    return particles;
   }
 
   void add_edges(std::size_t p) {
@@ -253,8 +282,7 @@ class Builder {
       GarmentEdge& edge = garment_.edges.emplace_back();
       edge.panel = static_cast<int>(p);
       edge.edge = static_cast<int>(e);
-      for (const int i : borders_.panels[p].edges[e])
-        edge.particles.push_back(particle_[p][as_index(i)]);
+      edge.particles = particles_of(p, borders_.panels[p].edges[e]);
       edge.length = outline[e].length();
     }
   }

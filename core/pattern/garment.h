@@ -16,12 +16,19 @@ struct GarmentEdge {
   double length = 0;           // m
 };
 
+// A crease of a panel in the sheet.
+struct GarmentCrease {
+  int panel = 0, crease = 0;
+  std::vector<int> particles;  // from its first point to its last
+};
+
 // A pattern cut into triangles and sewn.
 struct Garment {
   // Particles start where the placed panels have them, those that are sewn together in the mean of
   // their places. The flat shape is the pattern; panels that seams turn over are mirrored in u.
   TriangleMesh mesh;
   std::vector<GarmentEdge> edges;  // panel after panel
+  std::vector<GarmentCrease> creases;
   std::vector<Warning> notes;
   double least_height = 0;  // of the flat shape, m
 };

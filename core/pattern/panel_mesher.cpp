@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <numeric>
+#include <optional>
+#include <set>
 
 #include "core/pattern/curve.h"
 #include "core/pattern/sets.h"
@@ -17,72 +20,6 @@ constexpr double kAlike = 1e-9;  // of an edge: borders that are mirrored are cu
 
 std::size_t around(std::size_t i, std::size_t count) { return i < count ? i : i - count; }
 
-// Lines of a border, to be found by place.
-class Lines {
- public:
-  Lines(const std::vector<Vector2d>& border, double least_cell) : border_(border) {
-    low_ = high_ = border[0];
-    for (const Vector2d& point : border) low_ = low_.cwiseMin(point), high_ = high_.cwiseMax(point);
-    // some cells a line, however large the border's box is
-    const double count = 4 * static_cast<double>(border.size());
-    cell_ = std::max(least_cell, std::sqrt((high_ - low_).prod() / count));
-    columns_ = static_cast<int>((high_.x() - low_.x()) / cell_) + 1;
-    rows_ = static_cast<int>((high_.y() - low_.y()) / cell_) + 1;
-    cells_.resize(as_index(columns_) * as_index(rows_));
-    for (std::size_t i = 0; i < border.size(); ++i) {
-      const Vector2d &a = border[i], &b = border[around(i + 1, border.size())];
-      for_cells(a.cwiseMin(b), a.cwiseMax(b), [&](std::size_t at) { cells_[at].push_back(i); });
-    }
-  }
-
-  // Whether one comes nearer than that, m.
-  bool is_near(const Vector2d& point, double reach) const {
-    bool near = false;
-    const Vector2d around_it = Vector2d::Constant(reach);
-    for_cells(point - around_it, point + around_it, [&](std::size_t at) {
-      for (const std::size_t i : cells_[at]) {
-        const Vector2d &a = border_[i], b = border_[around(i + 1, border_.size())] - a;
-        const double t = std::clamp((point - a).dot(b) / b.squaredNorm(), 0.0, 1.0);
-        near |= (point - a - t * b).norm() < reach;
-      }
-    });
-    return near;
-  }
-
-  // Heights at which a vertical line enters and leaves the border.
-  std::vector<double> crossings(double x) const {
-    std::vector<double> heights;
-    for (std::size_t i = 0; i < border_.size(); ++i) {
-      const Vector2d &a = border_[i], &b = border_[around(i + 1, border_.size())];
-      if ((a.x() < x) == (b.x() < x)) continue;
-      heights.push_back(a.y() + (x - a.x()) / (b.x() - a.x()) * (b.y() - a.y()));
-    }
-    std::sort(heights.begin(), heights.end());
-    return heights;
-  }
-
-  const Vector2d& low() const { return low_; }
-  const Vector2d& high() const { return high_; }
-
- private:
-  template <class Use>
-  void for_cells(const Vector2d& from, const Vector2d& to, const Use& use) const {
-    const auto cell = [&](double offset, int count) {
-      return std::clamp(static_cast<int>(std::floor(offset / cell_)), 0, count - 1);
-    };
-    for (int row = cell(from.y() - low_.y(), rows_); row <= cell(to.y() - low_.y(), rows_); ++row)
-      for (int column = cell(from.x() - low_.x(), columns_);
-           column <= cell(to.x() - low_.x(), columns_); ++column)
-        use(as_index(row) * as_index(columns_) + as_index(column));
-  }
-
-  const std::vector<Vector2d>& border_;
-  double cell_;
-  Vector2d low_, high_;
-  int columns_, rows_;
-  std::vector<std::vector<std::size_t>> cells_;
-};
-
 // Columns of points along y, half an edge apart from one to the next.
 struct Lattice {
   Vector2d anchor;
@@ -90,8 +27,8 @@ struct Lattice {
   double edge;
 };
 
-// Points of the lattice inside that are clear of the border, column after column.
-std::vector<Vector2d> inner_points(const Lines& lines, const Lattice& lattice) {
+// Points of the lattice inside that are clear of all lines, column after column.
+std::vector<Vector2d> inner_points(const LineGrid& lines, const Lattice& lattice) {
   constexpr double kClear = 0.66;  // edges
   const double reach = (kClear - kAlike) * lattice.edge;
   const double apart = lattice.edge * std::numbers::sqrt3 / 2;
@@ -161,74 +98,153 @@ std::vector<Vector2d> turned(const std::vector<Vector2d>& points, double angle) 
   return result;
 }
 
+PanelLines turned(const PanelLines& lines, double angle) {
+  return {turned(lines.border, angle), turned(lines.inside, angle), lines.creases};
+}
+
 // The lattice is as it lies with the grain upwards.
-PanelMesh fill(const std::vector<Vector2d>& border, double grain, const Lattice& lattice) {
+PanelMesh fill(const PanelLines& lines, double grain, const Lattice& lattice) {
   constexpr double kBand = 2;  // edges: what lies deeper stays a lattice
-  const std::vector<Vector2d> upright = turned(border, -grain);
-  const Lines lines(upright, lattice.edge);
-  const std::vector<Vector2d> inner = inner_points(lines, lattice), points = turned(inner, grain);
-  Triangulation mesh(border);
+  const PanelLines upright = turned(lines, -grain);
+  const LineGrid grid(upright, lattice.edge);
+  const std::vector<Vector2d> inner = inner_points(grid, lattice), points = turned(inner, grain);
+  Triangulation mesh(lines.border);
+  for (const Vector2d& point : lines.inside) mesh.insert(point);
+  for (const std::vector<int>& crease : lines.creases) mesh.keep(crease);
   std::vector<std::size_t> movable;
   for (std::size_t i = 0; i < points.size(); ++i)
-    if (mesh.insert(points[i]) && lines.is_near(inner[i], (kBand - kAlike) * lattice.edge))
+    if (mesh.insert(points[i]) && grid.is_near(inner[i], (kBand - kAlike) * lattice.edge))
       movable.push_back(mesh.points().size() - 1);
   smooth(mesh, movable);
   mesh.settle_ties(grain, lattice.anchor.x());
   return {mesh.points(), mesh.triangles()};
 }
 
-// The half of a symmetric border that lies right of its axis, and what of it lies on the axis.
+// The image of each point of a symmetric border and of its creases; none where these have none, or
+// cross the axis between two points.
+std::vector<int> images_of(const PanelLines& lines, const Mirror& mirror) {
+  const std::size_t border = lines.border.size();
+  std::vector<int> images;
+  for (std::size_t i = 0; i < border; ++i)
+    images.push_back(mirror.image(static_cast<int>(i), border));
+  const auto alike = [](const Vector2d& a, const Vector2d& b) {
+    return (a - b).lpNorm<Eigen::Infinity>() <= kMicrometre;
+  };
+  std::vector<std::size_t> order(lines.inside.size());  // by height
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  const auto lower = [&](std::size_t i, double v) { return lines.inside[i].y() < v; };
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t i, std::size_t j) { return lower(i, lines.inside[j].y()); });
+  for (const Vector2d& point : lines.inside) {
+    const Vector2d wanted = mirror.image(point);
+    auto at = std::lower_bound(order.begin(), order.end(), wanted.y() - kMicrometre, lower);
+    while (at != order.end() && lines.inside[*at].y() <= wanted.y() + kMicrometre &&
+           !alike(lines.inside[*at], wanted))
+      ++at;
+    if (at == order.end() || !alike(lines.inside[*at], wanted)) return {};
+    images.push_back(static_cast<int>(border + *at));
+  }
+  std::set<std::pair<int, int>> all;
+  for (const auto& [a, b] : lines.all()) all.insert(std::minmax(a, b));
+  for (const auto& [a, b] : all) {
+    const double from = lines.point(a).x() - mirror.axis, to = lines.point(b).x() - mirror.axis;
+    const bool inside = as_index(a) >= border || as_index(b) >= border;
+    if (inside && std::min(from, to) < -kMicrometre && std::max(from, to) > kMicrometre) return {};
+    if (!all.contains(std::minmax(images[as_index(a)], images[as_index(b)]))) return {};
+  }
+  return images;
+}
+
+// What of a symmetric panel lies right of its axis, and on it.
 struct Half {
-  std::vector<Vector2d> border;  // up the right side, then down the axis
-  std::vector<int> original;     // of the first of them, in the whole border
-  double step = 0;               // of points on the axis, m
+  PanelLines lines;           // the border up the right side, then down the axis
+  std::vector<int> original;  // of each point in the whole panel; -1: of none
+  double step = 0;            // of points on the axis, m
 };
 
-std::optional<Half> right_half(const std::vector<Vector2d>& border, const Mirror& mirror,
-                               double edge) {
+// images: of all points of the panel.
+std::optional<Half> right_half(const PanelLines& whole, const Mirror& mirror,
+                               const std::vector<int>& images, double edge) {
   constexpr double kLeastAngle = 0.45;  // that a corner may be parted into, rad
-  std::vector<std::size_t> on_axis;
+  const std::vector<Vector2d>& border = whole.border;
+  std::vector<int> on_axis;  // upwards
   for (std::size_t i = 0; i < border.size(); ++i)
-    if (mirror.image(static_cast<int>(i), border.size()) == static_cast<int>(i))
-      on_axis.push_back(i);
+    if (images[i] == static_cast<int>(i)) on_axis.push_back(static_cast<int>(i));
   if (on_axis.size() != 2) return std::nullopt;
-  auto [low, high] = std::pair(on_axis[0], on_axis[1]);
-  if (border[low].y() > border[high].y()) std::swap(low, high);
+  const auto height = [&](int i) { return whole.point(i).y(); };
+  const auto lower = [&](int i, int j) { return height(i) < height(j); };
+  if (lower(on_axis[1], on_axis[0])) std::swap(on_axis[0], on_axis[1]);
+  const int low = on_axis[0], high = on_axis[1];
   Half half;
-  for (std::size_t i = low;; i = around(i + 1, border.size())) {
-    half.border.push_back(border[i]);
+  std::vector<Vector2d>& outline = half.lines.border;
+  for (std::size_t i = as_index(low);; i = around(i + 1, border.size())) {
+    outline.push_back(border[i]);
     half.original.push_back(static_cast<int>(i));
-    if (i == high) break;
+    if (i == as_index(high)) break;
   }
-  half.border.front().x() = half.border.back().x() = mirror.axis;
-  if (half.border.size() < 3) return std::nullopt;
-  const Vector2d begin = half.border[1] - half.border[0],
-                 end = half.border[half.border.size() - 2] - half.border.back();
+  outline.front().x() = outline.back().x() = mirror.axis;
+  if (outline.size() < 3) return std::nullopt;
+  const Vector2d begin = outline[1] - outline[0],
+                 end = outline[outline.size() - 2] - outline.back();
   if (std::min(std::atan2(begin.x(), begin.y()), std::atan2(end.x(), -end.y())) < kLeastAngle)
     return std::nullopt;
-  const double length = border[high].y() - border[low].y();
-  const double lines = std::max(1.0, std::floor(length / edge + 0.5 - 1e-6));
-  half.step = length / lines;
-  for (double k = lines - 1; k > 0; --k)
-    half.border.emplace_back(mirror.axis, border[low].y() + k * half.step);
+
+  // down the axis, by points of creases there
+  for (std::size_t i = border.size(); i < images.size(); ++i)
+    if (images[i] == static_cast<int>(i)) on_axis.push_back(static_cast<int>(i));
+  std::sort(on_axis.begin(), on_axis.end(), lower);
+  std::set<std::pair<int, int>> creased;
+  for (const std::vector<int>& crease : whole.creases)
+    for (std::size_t k = 0; k + 1 < crease.size(); ++k)
+      creased.insert(std::minmax(crease[k], crease[k + 1]));
+  half.step = edge;
+  for (std::size_t n = on_axis.size() - 1; n > 0; --n) {
+    const double from = height(on_axis[n - 1]), length = height(on_axis[n]) - from;
+    const bool one = creased.contains(std::minmax(on_axis[n - 1], on_axis[n]));
+    const double lines = one ? 1 : std::max(1.0, std::floor(length / edge + 0.5 - 1e-6));
+    if (on_axis.size() == 2) half.step = length / lines;
+    for (double k = lines - 1; k > 0; --k) {
+      outline.emplace_back(mirror.axis, from + k * length / lines);
+      half.original.push_back(-1);
+    }
+    if (n == 1) continue;
+    outline.emplace_back(mirror.axis, from);
+    half.original.push_back(on_axis[n - 1]);
+  }
+
+  // creases on the right
+  for (std::size_t i = border.size(); i < images.size(); ++i) {
+    const int point = static_cast<int>(i);
+    if (images[i] == point || whole.point(point).x() < mirror.axis) continue;
+    half.lines.inside.push_back(whole.point(point));
+    half.original.push_back(point);
+  }
+  std::map<int, int> number;
+  for (std::size_t i = 0; i < half.original.size(); ++i)
+    number[half.original[i]] = static_cast<int>(i);
+  for (const auto& [a, b] : creased)
+    if (number.contains(a) && number.contains(b) &&
+        (images[as_index(a)] != a || images[as_index(b)] != b))
+      half.lines.creases.push_back({number[a], number[b]});
   return half;
 }
 
-// Both halves of a border from a mesh of the right one.
-PanelMesh both_halves(const std::vector<Vector2d>& border, const Mirror& mirror, const Half& half,
-                      const PanelMesh& mesh) {
+// Both halves of a panel from a mesh of the right one.
+PanelMesh both_halves(const PanelLines& lines, const Mirror& mirror, const std::vector<int>& images,
+                      const Half& half, const PanelMesh& mesh) {
   const auto& [points, triangles] = mesh;
-  PanelMesh whole{border, {}};
+  PanelMesh whole{lines.border, {}};
+  whole.points.insert(whole.points.end(), lines.inside.begin(), lines.inside.end());
   std::vector<int> right(points.size()), left(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (i < half.original.size()) {
+    if (i < half.original.size() && half.original[i] >= 0) {
       right[i] = half.original[i];
-      left[i] = mirror.image(half.original[i], border.size());
+      left[i] = images[as_index(half.original[i])];
       continue;
     }
     right[i] = left[i] = static_cast<int>(whole.points.size());
     whole.points.push_back(points[i]);
-    if (i < half.border.size()) continue;
+    if (i < half.original.size()) continue;
     left[i] = static_cast<int>(whole.points.size());
     whole.points.push_back(mirror.image(points[i]));
   }
@@ -240,68 +256,31 @@ PanelMesh both_halves(const std::vector<Vector2d>& border, const Mirror& mirror,
   return whole;
 }
 
+// Of a panel with an axis u = constant that passes two of its border's points; or none.
+std::optional<PanelMesh> mesh_symmetric(const PanelLines& lines, double grain, double edge) {
+  const auto mirror = find_mirror(lines.border);
+  if (!mirror) return std::nullopt;
+  const std::vector<int> images = images_of(lines, *mirror);
+  if (images.empty()) return std::nullopt;
+  const auto half = right_half(lines, *mirror, images, edge);
+  if (!half || find_crossing(half->lines) || find_tight(half->lines, kCreaseRoom * edge))
+    return std::nullopt;
+  // along the axis the lattice has its points
+  const bool along = std::abs(std::sin(grain)) < 0.5;
+  const Lattice lattice{turned({half->lines.border[0]}, -grain)[0], along ? half->step : edge,
+                        edge};
+  return both_halves(lines, *mirror, images, *half, fill(half->lines, grain, lattice));
+}
+
 }  // namespace
 
-PanelMesh mesh_panel(const std::vector<Vector2d>& border, double grain, double edge) {
-  const auto mirror = is_square(grain) ? find_mirror(border) : std::nullopt;
-  if (const auto half = mirror ? right_half(border, *mirror, edge) : std::nullopt;
-      half && !find_crossing(half->border)) {
-    // along the axis the lattice has its points
-    const bool along = std::abs(std::sin(grain)) < 0.5;
-    const Lattice lattice{turned({half->border[0]}, -grain)[0], along ? half->step : edge, edge};
-    return both_halves(border, *mirror, *half, fill(half->border, grain, lattice));
-  }
-  const std::vector<Vector2d> upright = turned(border, -grain);
+PanelMesh mesh_panel(const PanelLines& lines, double grain, double edge) {
+  if (is_square(grain))
+    if (auto mesh = mesh_symmetric(lines, grain, edge)) return *std::move(mesh);
+  const std::vector<Vector2d> upright = turned(lines.border, -grain);
   Vector2d low = upright[0], high = upright[0];
   for (const Vector2d& point : upright) low = low.cwiseMin(point), high = high.cwiseMax(point);
-  return fill(border, grain, {(low + high) / 2, edge, edge});
-}
-
-std::optional<std::pair<int, int>> find_crossing(const std::vector<Vector2d>& border) {
-  const std::size_t count = border.size();
-  const auto end = [&](std::size_t i) -> const Vector2d& { return border[around(i + 1, count)]; };
-  std::vector<std::size_t> order(count);  // by their left ends
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  const auto left = [&](std::size_t i) { return std::min(border[i].x(), end(i).x()); };
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t i, std::size_t j) { return left(i) < left(j); });
-  const auto meet = [&](std::size_t i, std::size_t j) {
-    const Vector2d &a = border[i], &b = end(i), &c = border[j], &d = end(j);
-    if (std::min(a.y(), b.y()) > std::max(c.y(), d.y()) ||
-        std::min(c.y(), d.y()) > std::max(a.y(), b.y()))
-      return false;
-    if (around(i + 1, count) == j || around(j + 1, count) == i) {
-      // neighbours share an end, and meet where they fold back
-      const auto [first, last, next] =
-          around(i + 1, count) == j ? std::array{a, b, d} : std::array{c, d, b};
-      return orientation(first, last, next) == 0 && (last - first).dot(next - last) <= 0;
-    }
-    const int p = orientation(a, b, c), q = orientation(a, b, d);
-    const int r = orientation(c, d, a), s = orientation(c, d, b);
-    if (p == 0 && q == 0) {
-      const Vector2d low = a.cwiseMin(b).cwiseMax(c.cwiseMin(d)),
-                     high = a.cwiseMax(b).cwiseMin(c.cwiseMax(d));
-      return low.x() <= high.x() && low.y() <= high.y();
-    }
-    return p * q <= 0 && r * s <= 0;
-  };
-  std::vector<std::size_t> open;
-  for (const std::size_t i : order) {
-    std::erase_if(open,
-                  [&](std::size_t j) { return std::max(border[j].x(), end(j).x()) < left(i); });
-    for (const std::size_t j : open)
-      if (meet(i, j))
-        return std::pair(static_cast<int>(std::min(i, j)), static_cast<int>(std::max(i, j)));
-    open.push_back(i);
-  }
-  return std::nullopt;
-}
-
-double area_within(const std::vector<Vector2d>& border) {
-  double twice = 0;
-  for (std::size_t i = 0; i < border.size(); ++i)
-    twice += cross2(border[i] - border[0], border[around(i + 1, border.size())] - border[0]);
-  return twice / 2;
+  return fill(lines, grain, {(low + high) / 2, edge, edge});
 }
 
 double least_height(const std::array<Vector2d, 3>& triangle) {

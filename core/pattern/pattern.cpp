@@ -12,6 +12,7 @@ namespace weft {
 namespace {
 
 constexpr std::size_t kMostPanels = 256, kMostEdges = 1024, kMostSeams = 1024, kMostRuns = 64;
+constexpr std::size_t kMostCreases = 64, kMostCreasePoints = 64;
 constexpr double kMostCoordinate = 100, kLeastLength = 1e-5;  // m
 constexpr double kMostGrain = 7;                              // rad
 constexpr double kMostLines = 10'000;  // around a panel: they are compared in pairs
@@ -71,6 +72,7 @@ class PatternCheck {
       problem(at + ".name", "\"", panel.name, "\" is taken");
     number(at + ".grain_rad", panel.grain, -kMostGrain, kMostGrain, " rad");
     check_placement(panel, at + ".placement");
+    check_creases(panel, at);
     if (panel.edges.size() < 2 || panel.edges.size() > kMostEdges)
       return problem(at + ".edges", "has ", panel.edges.size(), " edges, not 2 to ", kMostEdges);
     bool good = true;
@@ -106,15 +108,49 @@ class PatternCheck {
       problem(field + ".rotation", "has a length of ", panel.rotation.norm(), "; it must not be 0");
   }
 
+  void check_creases(const PatternPanel& panel, const std::string& at) {
+    if (panel.creases.size() > kMostCreases)
+      return problem(at + ".creases", "has ", panel.creases.size(), " creases, more than ",
+                     kMostCreases);
+    double whole = 0;
+    for (std::size_t c = 0; c < panel.creases.size(); ++c) {
+      const auto& [points, angle] = panel.creases[c];
+      const std::string place = join(at, ".creases[", c, "]");
+      number(place + ".fold_rad", angle, -kMostFold, kMostFold, " rad");
+      if (points.size() < 2 || points.size() > kMostCreasePoints) {
+        problem(place + ".points_m", "has ", points.size(), " points, not 2 to ",
+                kMostCreasePoints);
+        continue;
+      }
+      if (!check_points(points, place)) continue;
+      double length = 0;
+      for (std::size_t i = 0; i + 1 < points.size(); ++i)
+        length += (points[i + 1] - points[i]).norm();
+      if (!(length >= kLeastLength))
+        problem(place + ".points_m", "make a line of ", length, " m; it needs ", kLeastLength,
+                " m or more");
+      whole += length;
+    }
+    if (whole > kMostLines * edge_)
+      problem(edge_field_, "of ", edge_, " m makes about ", std::floor(whole / edge_),
+              " lines along creases of panel ", panel.name, ", more than ", kMostLines);
+  }
+
+  bool check_points(const std::vector<Vector2d>& points, const std::string& at) {
+    bool good = true;
+    for (const Vector2d& point : points)
+      for (const double value : point)
+        good &= number(at + ".points_m", value, -kMostCoordinate, kMostCoordinate, " m");
+    return good;
+  }
+
   bool check_edge(const PatternEdge& edge, const std::string& at) {
     const std::size_t before = problems_.size();
     if (edge.points.empty() || edge.points.size() > 3)
       problem(at + ".points_m", "has ", edge.points.size(), " points, not 1 to 3");
     else if (edge.arc && edge.points.size() != 2)
       problem(at + ".arc", "is for 2 points; there are ", edge.points.size());
-    for (const Vector2d& point : edge.points)
-      for (const double value : point)
-        number(at + ".points_m", value, -kMostCoordinate, kMostCoordinate, " m");
+    check_points(edge.points, at);
     if (!is_name(edge.label))
       problem(at + ".label", "\"", edge.label.substr(0, 80),
               "\" is not up to 63 characters of a-z, 0-9, - and _");

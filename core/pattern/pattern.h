@@ -16,6 +16,12 @@ struct PatternEdge {
   std::string label = {};
 };
 
+// A line inside a panel that it is creased along, from point to point.
+struct PatternCrease {
+  std::vector<Vector2d> points;  // u and v, m; an end beside the outline lies on it
+  double angle = 0;              // that it is pressed to, as Fold has it, rad; 0: no fold
+};
+
 // A piece of a garment, u to the right and v up; unplaced it lies at x = u, y = v.
 struct PatternPanel {
   std::string name;
@@ -23,6 +29,7 @@ struct PatternPanel {
   double grain = 0;                    // from the v axis to the warp, rad, anticlockwise
   Vector3d origin = Vector3d::Zero();  // where (0, 0) is placed, m
   Quaterniond rotation = Quaterniond::Identity();  // about it
+  std::vector<PatternCrease> creases = {};
 };
 
 // Part of an edge, by shares of its length.

@@ -8,8 +8,6 @@
 namespace weft {
 namespace {
 
-constexpr double kMicrometre = 1e-6;  // m
-
 double middle(const std::vector<Vector2d>& points) {
   double least = std::numeric_limits<double>::infinity(), most = -least;
   for (const Vector2d& point : points)

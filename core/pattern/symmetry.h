@@ -7,6 +7,8 @@
 
 namespace weft {
 
+inline constexpr double kMicrometre = 1e-6;  // m: points that close are the same
+
 // A line u = axis, about which points around an outline are each other's mirror images: point i
 // and point `sum` - i, counted around.
 struct Mirror {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <map>
 
 #include "core/cloth_contact/orientation.h"
@@ -133,6 +134,8 @@ bool Triangulation::insert(const Vector2d& point) {
   if (on >= 0) {
     const int other = triangle(t).beside[as_index(on)];
     if (other < 0) return false;
+    const auto& corner = triangle(t).corner;
+    if (is_kept(corner[as_index(on)], corner[as_index((on + 1) % 3)])) return false;
     points_.push_back(point);
     // each of both triangles in two
     const auto turned_to = [](const Triangle& from, int k) {
@@ -213,11 +216,83 @@ void Triangulation::restore(std::vector<Side> sides) {
     sides.pop_back();
     if (triangle(side.triangle).beside[as_index(side.k)] < 0) continue;
     const Quad quad = across(side);
-    if (excess(quad) < kRounding || !is_convex(quad)) continue;
+    if (is_kept(quad.a, quad.b) || excess(quad) < kRounding || !is_convex(quad)) continue;
     flip(side, quad);
     for (const int t : {side.triangle, quad.other})
       for (const int k : {0, 1, 2}) sides.push_back({t, k});
   }
+}
+
+// Around a point of the mesh.
+std::vector<int> Triangulation::triangles_at(int point) const {
+  std::vector<int> found = {find(at(point))};
+  const auto beside = [&](int t, std::size_t step) {
+    return triangle(t).beside[(corner_of(t, point) + step) % 3];
+  };
+  for (const std::size_t step : {std::size_t{2}, std::size_t{0}})
+    for (int t = beside(found[0], step); t >= 0; t = beside(t, step)) {
+      if (t == found[0]) return found;
+      found.push_back(t);
+    }
+  return found;
+}
+
+std::size_t Triangulation::corner_of(int t, int point) const {
+  const auto& corner = triangle(t).corner;
+  return static_cast<std::size_t>(std::find(corner.begin(), corner.end(), point) - corner.begin());
+}
+
+// The sides that a line between two points crosses, by their points on its right and on its left.
+std::vector<std::pair<int, int>> Triangulation::sides_across(int a, int b) const {
+  Side side{-1, 0};
+  for (const int t : triangles_at(a)) {
+    const std::size_t k = corner_of(t, a);
+    const auto& corner = triangle(t).corner;
+    const int right = corner[(k + 1) % 3], left = corner[(k + 2) % 3];
+    if (right == b || left == b) return {};
+    if (orientation(at(a), at(b), at(right)) < 0 && orientation(at(a), at(b), at(left)) > 0)
+      side = {t, static_cast<int>((k + 1) % 3)};
+  }
+  std::vector<std::pair<int, int>> sides;
+  while (side.triangle >= 0 && triangle(side.triangle).beside[as_index(side.k)] >= 0) {
+    const Quad quad = across(side);
+    sides.emplace_back(quad.a, quad.b);
+    if (quad.d == b) break;
+    const bool on_left = orientation(at(a), at(b), at(quad.d)) > 0;
+    side = {quad.other, (quad.back + (on_left ? 1 : 2)) % 3};
+  }
+  return sides;
+}
+
+// Turns diagonals in the way until none is (Sloan 1993).
+void Triangulation::keep(int a, int b) {
+  const std::vector<std::pair<int, int>> across_it = sides_across(a, b);
+  std::deque<std::pair<int, int>> waiting(across_it.begin(), across_it.end());
+  const std::size_t most = 16 * across_it.size() * across_it.size();  // far more than it takes
+  for (std::size_t tries = 0; !waiting.empty() && tries < most; ++tries) {
+    const auto [from, to] = waiting.front();
+    waiting.pop_front();
+    for (const int t : triangles_at(from)) {
+      const Side side{t, static_cast<int>(corner_of(t, from))};
+      if (triangle(t).corner[(as_index(side.k) + 1) % 3] != to) continue;
+      const Quad quad = across(side);
+      const auto& [p, q, c, d, other, back] = quad;
+      const bool convex = is_convex(quad);
+      if (convex) flip(side, quad);
+      if (!convex)
+        waiting.emplace_back(from, to);
+      else if (c != a && c != b && d != a && d != b &&
+               orientation(at(a), at(b), at(c)) * orientation(at(a), at(b), at(d)) < 0)
+        waiting.emplace_back(c, d);
+      break;
+    }
+  }
+  kept_.insert(std::minmax(a, b));
+}
+
+void Triangulation::keep(const std::vector<int>& line) {
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) keep(line[i], line[i + 1]);
+  restore_all();
 }
 
 void Triangulation::restore_all() {
@@ -266,7 +341,7 @@ void Triangulation::settle_ties(double grain, double axis) {
         if (triangle(t).beside[as_index(k)] < t) continue;
         const Quad quad = across(side);
         const auto& [a, b, c, d, other, back] = quad;
-        if (std::abs(excess(quad)) > kTie || !is_convex(quad)) continue;
+        if (is_kept(a, b) || std::abs(excess(quad)) > kTie || !is_convex(quad)) continue;
         if (far(c, d) > far(a, b) - kTie * (at(a) - at(b)).norm()) continue;
         flip(side, quad);
         changed = true;

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "core/model/shape.h"
@@ -20,6 +23,9 @@ class Triangulation {
 
   // Adds a point; not where one is, on the polygon or outside of it. Whether it did.
   bool insert(const Vector2d& point);
+  // Makes sides of the lines from point to point, for good.
+  // Precondition: they pass no other point, and cross none that is kept.
+  void keep(const std::vector<int>& line);
   // Moves points that are not the polygon's, as far as triangles stay anticlockwise, and puts
   // Delaunay's rule in order.
   void move(const std::vector<Vector2d>& points);
@@ -51,6 +57,11 @@ class Triangulation {
   void clip_ears();
   void link();
   int find(const Vector2d& point) const;
+  std::vector<int> triangles_at(int point) const;
+  std::size_t corner_of(int t, int point) const;
+  std::vector<std::pair<int, int>> sides_across(int a, int b) const;
+  void keep(int a, int b);
+  bool is_kept(int a, int b) const { return !kept_.empty() && kept_.contains(std::minmax(a, b)); }
   void replace_neighbour(int t, int old, int now);
   Quad across(const Side& side) const;
   // How much it wants the other diagonal: above 0 it does.
@@ -63,6 +74,7 @@ class Triangulation {
   std::vector<Vector2d> points_;
   std::size_t polygon_ = 0;
   std::vector<Triangle> triangles_;
+  std::set<std::pair<int, int>> kept_;
   mutable int last_ = 0;  // found
 };
 

@@ -34,6 +34,9 @@ class PatternReader {
     panel.grain = from.grain_rad();
     for (int e = 0; e < from.edges_size(); ++e)
       panel.edges.push_back(edge(from.edges(e), join(at, ".edges[", e, "]")));
+    for (int c = 0; c < from.creases_size(); ++c)
+      panel.creases.push_back({points(from.creases(c).points_m(), join(at, ".creases[", c, "]")),
+                               from.creases(c).fold_rad()});
     const v1::Vector3& origin = from.placement().origin_m();
     panel.origin = {origin.x(), origin.y(), origin.z()};
     if (from.placement().has_rotation()) {
@@ -45,13 +48,17 @@ class PatternReader {
   }
 
   PatternEdge edge(const v1::PatternEdge& from, const std::string& at) {
-    if (from.points_m_size() % 2 != 0)
+    return {.points = points(from.points_m(), at), .arc = from.arc(), .label = from.label()};
+  }
+
+  std::vector<Vector2d> points(const google::protobuf::RepeatedField<double>& numbers,
+                               const std::string& at) {
+    if (numbers.size() % 2 != 0)
       problems_.push_back(
-          {at + ".points_m", join("has ", from.points_m_size(), " numbers; each point has 2")});
-    PatternEdge edge{.points = {}, .arc = from.arc(), .label = from.label()};
-    for (int i = 0; i + 1 < from.points_m_size(); i += 2)
-      edge.points.emplace_back(from.points_m(i), from.points_m(i + 1));
-    return edge;
+          {at + ".points_m", join("has ", numbers.size(), " numbers; each point has 2")});
+    std::vector<Vector2d> points;
+    for (int i = 0; i + 1 < numbers.size(); i += 2) points.emplace_back(numbers[i], numbers[i + 1]);
+    return points;
   }
 
   static std::vector<EdgeRun> runs(
@@ -92,6 +99,12 @@ v1::BuildGarmentResponse to_proto(Garment garment, const v1::Pattern& pattern, d
     added->set_label(panel.edges(each.edge).label());
     added->mutable_particles()->Assign(each.particles.begin(), each.particles.end());
     added->set_length_m(each.length);
+  }
+  for (const GarmentCrease& each : garment.creases) {
+    v1::BuiltCrease* added = to.add_creases();
+    added->set_panel(pattern.panels(each.panel).name());
+    added->set_crease(each.crease);
+    added->mutable_particles()->Assign(each.particles.begin(), each.particles.end());
   }
   v1::MeshData* mesh = to.mutable_sheet()->mutable_triangles()->mutable_data();
   *mesh = to_proto(complete(std::move(garment.mesh)));

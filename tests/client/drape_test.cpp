@@ -1,9 +1,12 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <sstream>
 
 #include "client/garments/pattern_file.h"
+#include "client/recording/cloth.h"
 #include "client/recording/points.h"
 #include "client/recording/reader.h"
 #include "tests/client/client_test.h"
@@ -151,6 +154,46 @@ TEST_F(Drape, OverWhatIsWornStaysOutsideOfIt) {
             0);
   EXPECT_THAT(over(path("moving.weft"), {}).err,
               HasSubstr("moving.weft: \"collider\" moves; what is worn stands still"));
+}
+
+TEST_F(Drape, OfAShirtIsGoodAndItsCollarFallsAllAround) {
+  const Outcome outcome =
+      run_weft({"drape", "shirt", "--edge", "0.025", "--textile", "jersey_interlock", "--recording",
+                path("shirt.weft"), "--json"});
+  ASSERT_EQ(outcome.exit, 0) << outcome.err;
+  EXPECT_EQ(outcome.json()["verdict"]["cloth_cut_count"], 0);
+  client::RecordingReader recording(path("shirt.weft"));
+  const client::ClothMesh shirt = client::cloth_of(recording)[0];
+  const client::Points points =
+      client::read_points(recording.read(recording.last_frame()).positions_m(), recording.header());
+  const auto particles = [&](const std::string& name) {
+    std::set<int> found;
+    for (const client::ClothPanel& panel : shirt.panels)
+      for (std::size_t t = panel.first; t < panel.first + panel.count; ++t)
+        if (panel.name == name)
+          for (const auto i : shirt.triangles[t]) found.insert(static_cast<int>(i));
+    return found;
+  };
+  for (const std::string side : {"front", "back"}) {
+    const std::set<int> stand = particles("stand-" + side);
+    const std::set<int> fall = particles("fall-" + side);
+    const auto place = [&](int particle) {
+      const auto i = static_cast<std::size_t>(particle);
+      return std::array{points.x[i], points.y[i], points.z[i]};
+    };
+    for (const int i : fall) {
+      if (stand.contains(i)) continue;
+      // lower than where the collar turns, in the direction from the neck's middle that it lies in
+      const auto [x, y, z] = place(i);
+      double most = -1, roll = 0;
+      for (const int j : fall) {
+        const auto [u, v, w] = place(j);
+        const double along = (x * u + z * w) / (std::hypot(x, z) * std::hypot(u, w));
+        if (stand.contains(j) && along > most) most = along, roll = v;
+      }
+      EXPECT_LT(y, roll - 0.015) << side << ' ' << i;
+    }
+  }
 }
 
 TEST_F(Drape, OfWhatIsTooWideSlidesDownAndIsNotGood) {

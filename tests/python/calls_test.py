@@ -316,11 +316,15 @@ class Plain(unittest.TestCase):
     def test_patterns_are_cut_and_sewn(self):
         outline = [weft.PatternEdge([corner]) for corner in ((0.3, 0), (0.3, 0.2), (0, 0.2), (0, 0))]
         tube = weft.Pattern(
-            [weft.PatternPanel("tube", outline)],
+            [weft.PatternPanel("tube", outline,
+                               creases=[weft.PatternCrease([(0.1, 0), (0.1, 0.2)], 2)])],
             [weft.PatternSeam([weft.EdgeRun("tube", 1)], [weft.EdgeRun("tube", 3)])])
+        self.assertEqual(weft.Pattern.from_json(tube.to_json()), tube)
         built = self.server.build_garment(tube, 0.02)
         self.assertEqual(list(built.edges[1].particles), list(built.edges[3].particles)[::-1])
         sheet = weft.Sheet.from_proto(built.sheet)
+        fold, = sheet.shape.source.folds
+        self.assertEqual(list(fold.particles), list(built.creases[0].particles))
         sheet.textile = weft.Textile.preset("denim_11oz")
         self.server.check(weft.Scene([sheet]))
         tube.panels[0].edges[2].points_m = [(0, float("nan"))]

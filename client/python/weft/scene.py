@@ -532,8 +532,27 @@ class PatternEdge(Value):
 
 
 @dataclass(eq=False)
+class PatternCrease(Value):
+    """A line inside a panel that it is creased along.
+
+    points_m  (n, 2) from point to point; an end beside the outline lies on it
+    fold_rad  as Fold.angle_rad; 0 is no fold
+    """
+
+    message = garment_pb2.PatternCrease
+    points_m: npt.ArrayLike
+    fold_rad: float = 0
+
+    @classmethod
+    def from_proto(cls, message: Any) -> "PatternCrease":
+        crease = super().from_proto(message)
+        crease.points_m = np.array(crease.points_m, float).reshape(-1, 2)
+        return crease
+
+
+@dataclass(eq=False)
 class PatternPanel(Value):
-    """A piece as it is cut: its outline, anticlockwise."""
+    """A piece as it is cut: its outline, anticlockwise, and lines that it is creased along."""
 
     message = garment_pb2.PatternPanel
     name: str
@@ -541,6 +560,7 @@ class PatternPanel(Value):
     grain_rad: float = 0
     placement: Placement | None = None
     textile: Textile | None = None
+    creases: Sequence[PatternCrease] = ()
 
 
 @dataclass(eq=False)

@@ -53,7 +53,7 @@ class Contacts {
   // more than kNothing (m).
   static constexpr int kRounds = 32;
   static constexpr double kNothing = 1e-12;
-  static constexpr double kOutward = 0.25;  // m/s, see resolve()
+  static constexpr double kOutward = 1;  // m/s, see resolve()
   // How far the fastest collider moves in this step, m.
   double reach() const { return reach_; }
   // Whether a particle that moves so far (m) in this step could come through a collider unseen.
@@ -65,8 +65,9 @@ class Contacts {
   // Moves a particle that is closer to a collider than the skin out to it, inelastically, and slows
   // its sliding by Coulomb friction. Where it could have crossed one in the step, it meets them in
   // parts of the step, in each of which it comes no farther than a quarter of the thickness. What
-  // is deeper in a body of triangles than it can have come in the step began there: it leaves at
-  // kOutward. x: position, d: displacement of the last step, m. Whether it touched one.
+  // is deeper in a body of triangles than it can have come in the step began there, or other cloth
+  // has pressed it in: it leaves at kOutward. x: position, d: displacement of the last step, m.
+  // Whether it touched one.
   bool resolve(Vector3d& x, Vector3d& d) const;
 
  private:

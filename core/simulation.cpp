@@ -94,12 +94,14 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
 
   // colliders last, so that no particle ends a step inside one
   if (scene.colliders.empty()) return;
+  const double pressed = cloth_contact ? cloth_contact->moved() : 0;
   for (std::size_t s = 0; s < sheets.size(); ++s)
-    sheets[s].solver->resolve(contacts_of(s, time, dt), pool);
+    sheets[s].solver->resolve(contacts_of(s, time, dt, pressed), pool);
 }
 
-// In the substep from `time` to `time` + dt; bodies are placed.
-Contacts Simulation::State::contacts_of(std::size_t sheet, double time, double dt) const {
+// In the substep from `time` to `time` + dt; bodies are placed. pressed: contact.h.
+Contacts Simulation::State::contacts_of(std::size_t sheet, double time, double dt,
+                                        double pressed) const {
   double deflate = 0, growth = 0, friction = scene.sheets[sheet].textile.friction;
   if (scene.dressing) {
     const DressingState dressing = dressing_at(*scene.dressing, time + dt);
@@ -107,7 +109,8 @@ Contacts Simulation::State::contacts_of(std::size_t sheet, double time, double d
     growth = dressing_at(*scene.dressing, time).deflate - deflate;
     friction *= dressing.friction;
   }
-  return {scene.colliders, bodies, friction, sheets[sheet].skin, time + dt, dt, deflate, growth};
+  return {scene.colliders, bodies, friction, sheets[sheet].skin, time + dt, dt,
+          deflate,         growth, pressed};
 }
 
 // False: the frame cannot be computed.

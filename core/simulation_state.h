@@ -62,7 +62,7 @@ struct Simulation::State {
   int particle_count() const;
   LeftOut at_open_seams() const;
   void make_cloth_contact();
-  Contacts contacts_of(std::size_t sheet, double time, double dt) const;
+  Contacts contacts_of(std::size_t sheet, double time, double dt, double pressed = 0) const;
   void release_memory();
   void restore_memory();
   SheetDefinition simulated(std::size_t sheet) const;

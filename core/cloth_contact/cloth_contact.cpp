@@ -41,6 +41,7 @@ void ClothContact::forget() {
 }
 
 void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame) {
+  corrected_ = 0;
   double in_step = 0, pushed = 0;  // in relation to each other
   for (const MovingSheet& sheet : sheets) {
     in_step = std::max(in_step, 2 * kMotionRounding * sheet.solver->moved());
@@ -195,7 +196,6 @@ void ClothContact::set_out() {
 
 // To those that moved: others keep their bits.
 void ClothContact::write(std::span<MovingSheet> sheets) {
-  double corrected = 0;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     changed_.clear();
     Eigen::Index n = 0;
@@ -204,14 +204,14 @@ void ClothContact::write(std::span<MovingSheet> sheets) {
       const Vector3d by = mover.way.head<3>() - (x_.col(i) - begin_.col(i)),
                      in_step = mover.in_step.head<3>() - d_.col(i);
       if (by.isZero(0) && in_step.isZero(0)) continue;
-      corrected = std::max(corrected, kMotionRounding * by.norm());
+      corrected_ = std::max(corrected_, kMotionRounding * by.norm());
       changed_.push_back(i - cloth_.first_particle[s]);
       x_.col(n) = by;
       d_.col(n++) = in_step;
     }
     if (n > 0) sheets[s].solver->displace(changed_, x_.leftCols(n), d_.leftCols(n));
   }
-  come_ += 2 * corrected;
+  come_ += 2 * corrected_;
 }
 
 }  // namespace weft

@@ -40,6 +40,8 @@ class ClothContact {
   bool untangles() const { return !untangling_.empty(); }
   // Of sheets that have taken a step of dt, s.
   void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame);
+  // How far that moved a particle at most, m.
+  double moved() const { return corrected_; }
 
   // At the end of the last frame (cuts.h).
   std::int64_t count_cuts(std::span<const MovingSheet> sheets);
@@ -71,6 +73,7 @@ class ClothContact {
   // in relation to each other: since where the window began, and from where lists were looked at
   // until there, m
   double come_ = 0, moved_ = 0;
+  double corrected_ = 0;  // how far contact moved a particle in the last step at most, m
 
   std::vector<double> inverse_mass_;  // of all particles, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m

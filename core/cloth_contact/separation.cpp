@@ -80,6 +80,7 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
                      const Vector3d& apart, double distance, double friction,
                      const Surroundings& around) {
   constexpr double kLeastReach = 0.02;  // of the thickness, where things nearly touch
+  constexpr double kLeastMoves = 0.01;
   const auto mover = [&](std::size_t n) -> const Mover& {
     return around.movers[static_cast<std::size_t>(candidate.particle[n])];
   };
@@ -97,12 +98,15 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   if (!around.untangling.empty() && around.untangling.has(candidate.particle)) return;
 
   std::array<double, 4> share;
-  double moves = 0;  // 1/kg, of what the pair moves
+  double moves = 0, lightest = 0;  // 1/kg, of what the pair moves
   for (std::size_t n = 0; n < 4; ++n) {
-    share[n] = weight[n] * around.inverse_mass[static_cast<std::size_t>(candidate.particle[n])];
+    const double inverse = around.inverse_mass[static_cast<std::size_t>(candidate.particle[n])];
+    share[n] = weight[n] * inverse;
     moves += weight[n] * share[n];
+    lightest = std::max(lightest, inverse);
   }
-  if (moves == 0) return;
+  // what is held there, or moves far where its nearest point moves little, stays as it is
+  if (moves <= kLeastMoves * lightest) return;
   for (double& part : share) part /= moves;
   const double reach =
       std::max(std::min(distance / 2, candidate.thickness / 4), kLeastReach * candidate.thickness);

@@ -170,7 +170,8 @@ Distance distance(const Collider& collider, const Vector3d& point, double time,
 }
 
 Contacts::Contacts(std::span<const Collider> colliders, const MovingBodies& bodies, double friction,
-                   double skin, double time, double dt, double deflate, double growth)
+                   double skin, double time, double dt, double deflate, double growth,
+                   double pressed)
     : skin_(skin - deflate), thinnest_(kInfinite) {
   placed_.reserve(colliders.size());
   for (const Collider& collider : colliders) {
@@ -195,7 +196,7 @@ Contacts::Contacts(std::span<const Collider> colliders, const MovingBodies& bodi
                        offset, carried, std::sqrt(friction * collider.friction),
                        deflate > 0 ? std::max(thick, kLeastThickness) : thick,
                        of_triangles ? DistanceGrid::kSteepest : 1,
-                       of_triangles ? kOutward * dt : kInfinite, posed});
+                       of_triangles ? kOutward * dt + pressed : kInfinite, posed});
     reach_ = std::max(reach_, moved + growth);
     thinnest_ = std::min(thinnest_, placed_.back().thickness);
   }

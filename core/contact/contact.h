@@ -31,8 +31,10 @@ class Contacts {
  public:
   // friction: of the textile; skin: m; from `time` - dt to `time`, s. Colliders are smaller all
   // around by `deflate` (m), and grow by `growth` (m) in the step. bodies: placed for the step.
+  // pressed: how far other cloth may have moved a particle in the step without speed, m.
   Contacts(std::span<const Collider> colliders, const MovingBodies& bodies, double friction,
-           double skin, double time, double dt, double deflate = 0, double growth = 0);
+           double skin, double time, double dt, double deflate = 0, double growth = 0,
+           double pressed = 0);
 
   // A collider where it is at the end of the step.
   struct Placed {
@@ -43,7 +45,7 @@ class Contacts {
     double friction;                   // between it and the textile
     double thickness;                  // of it where it is thinnest, with the skin on both sides, m
     double steepest;                   // by how much its distances grow in a metre, at most
-    double creep;                      // how far what began in it is pushed out in the step, m
+    double creep;                      // how far what is in it is pushed out in the step, m
     const PosedBody* posed = nullptr;  // between poses; offset and carried are of its middle then
   };
   std::span<const Placed> placed() const { return placed_; }
@@ -53,7 +55,7 @@ class Contacts {
   // more than kNothing (m).
   static constexpr int kRounds = 32;
   static constexpr double kNothing = 1e-12;
-  static constexpr double kOutward = 1;  // m/s, see resolve()
+  static constexpr double kOutward = 0.25;  // m/s, see resolve()
   // How far the fastest collider moves in this step, m.
   double reach() const { return reach_; }
   // Whether a particle that moves so far (m) in this step could come through a collider unseen.
@@ -65,9 +67,8 @@ class Contacts {
   // Moves a particle that is closer to a collider than the skin out to it, inelastically, and slows
   // its sliding by Coulomb friction. Where it could have crossed one in the step, it meets them in
   // parts of the step, in each of which it comes no farther than a quarter of the thickness. What
-  // is deeper in a body of triangles than it can have come in the step began there, or other cloth
-  // has pressed it in: it leaves at kOutward. x: position, d: displacement of the last step, m.
-  // Whether it touched one.
+  // is deeper in a body of triangles than it can have come in the step began there: it leaves at
+  // kOutward. x: position, d: displacement of the last step, m. Whether it touched one.
   bool resolve(Vector3d& x, Vector3d& d) const;
 
  private:

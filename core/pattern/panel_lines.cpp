@@ -69,8 +69,8 @@ std::optional<std::pair<int, int>> find_crossing(const PanelLines& lines) {
     if (std::min(a.y(), b.y()) > std::max(c.y(), d.y()) ||
         std::min(c.y(), d.y()) > std::max(a.y(), b.y()))
       return false;
-    for (const std::size_t k : {0, 1})
-      for (const std::size_t l : {0, 1})
+    for (const std::size_t k : {0U, 1U})
+      for (const std::size_t l : {0U, 1U})
         if (ends[i][k] == ends[j][l]) {
           // they meet where they fold back from their common end
           const Vector2d &first = point(i, 1 - k), &last = point(i, k), &next = point(j, 1 - l);

@@ -13,6 +13,7 @@
 
 #include "core/cloth_contact/cuts.h"
 #include "core/triangles/cut.h"
+#include "tests/support/core/bodies.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::testing {
@@ -160,6 +161,47 @@ TEST(ClothContact, AStackOfSheetsIsCarriedByTheLowest) {
     EXPECT_NEAR(x[s].row(1).mean() - x[s - 1].row(1).mean(), thickness, within) << s;
   }
   EXPECT_LT(simulation.kinetic_energy(), 3e-6);
+  EXPECT_EQ(cuts_now(simulation), 0);
+}
+
+// Two sheets one over the other, held at their borders, which go down by so much in half a second.
+Scene held_in_layers(double apart, double down) {
+  std::vector<SheetDefinition> sheets;
+  for (int s = 0; s < 2; ++s) {
+    SheetDefinition& sheet = sheets.emplace_back(triangles(0.2, 0.2));
+    sheet.name = std::to_string(s);
+    sheet.textile = soft_cloth(0.1);
+    sheet.textile.damping_ratio = 0.1;
+    sheet.origin = {-0.1, apart * s, -0.1};
+    const Matrix3Xd x = start_positions(sheet);
+    Pin& border = sheet.pins.emplace_back();
+    for (int i = 0; i < sheet.particle_count(); ++i)
+      if (std::max(std::abs(x(0, i)), std::abs(x(2, i))) > 0.099) border.particles.push_back(i);
+    border.path = {{0, Vector3d::Zero()}, {0.5, Vector3d(0, -down, 0)}};
+  }
+  return touching(sheets);
+}
+
+TEST(ClothContact, OfSheetsThatAreHeldCloserThanTheirThicknessStaysCalm) {
+  Simulation simulation(held_in_layers(1e-3, 0));
+  for (int frame = 0; frame < 6; ++frame) ASSERT_TRUE(simulation.advance_frame());
+  EXPECT_TRUE(simulation.repairs().empty());
+  EXPECT_LT(simulation.kinetic_energy(), 1e-3);
+  EXPECT_EQ(cuts_now(simulation), 0);
+}
+
+TEST(ClothContact, DoesNotPressTautLayersIntoTheBodyBeneath) {
+  constexpr double kRadius = 0.06;
+  Scene scene = held_in_layers(2.5e-3, 0.06);
+  Collider ball = solid(ball_mesh(kRadius, 4), 0.1);
+  ball.name = "ball";
+  ball.path = {{0, Vector3d(0, -kRadius - 2.1e-3, 0)}};
+  scene.colliders = {ball};
+  Simulation simulation(scene);
+  for (int frame = 0; frame < 32; ++frame) ASSERT_TRUE(simulation.advance_frame());
+  const Matrix3Xd all = positions(simulation);
+  for (const auto x : all.colwise())
+    EXPECT_GT((x + Vector3d(0, kRadius + 2.1e-3, 0)).norm(), kRadius - 1e-4);
   EXPECT_EQ(cuts_now(simulation), 0);
 }
 

@@ -80,7 +80,7 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
                      const Vector3d& apart, double distance, double friction,
                      const Surroundings& around) {
   constexpr double kLeastReach = 0.02;  // of the thickness, where things nearly touch
-  constexpr double kLeastMoves = 0.01;
+  constexpr double kLeastMoves = 0.01;  // of its lightest particle's 1 / mass
   const auto mover = [&](std::size_t n) -> const Mover& {
     return around.movers[static_cast<std::size_t>(candidate.particle[n])];
   };

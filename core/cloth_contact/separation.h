@@ -29,9 +29,10 @@ struct NearCloth {
 // their own sides. Inelastic: it takes away the approach that has brought the pair nearer than its
 // thickness, or would in the steps to come, and friction by Coulomb as much of its sliding as that
 // allows. Pairs that are nearer all the same are moved apart without speed, some of the way each
-// time. What a pair gives to one it takes from the other. Pairs follow one another in their order,
-// again and again, and take back what others have made needless; they begin with what they gave
-// the last time, which in cloth that lies still is what they will give.
+// time. Where all but a corner is held, which the nearest points hardly follow, a pair does not
+// act. What a pair gives to one it takes from the other. Pairs follow one another in their order,
+// again and again, and take back what others have made needless; they begin with what they gave the
+// last time, which in cloth that lies still is what they will give.
 class Separation {
  public:
   // Finds the candidates that may have come nearer than their thickness on their way, as far as

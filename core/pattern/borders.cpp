@@ -302,14 +302,14 @@ class Cutter {
   // Lines of a piece, and of what it is sewn to: as many as suit the mean of both.
   int lines_for(const Piece& piece) const {
     constexpr double kMostTurn = std::numbers::pi / 4;  // of a line against the next, rad
-    constexpr double kRounding = 1e-6;                  // so that equal lengths have equal counts
+    constexpr double kRounding = 1e-6;                  // so that equal turns have equal counts
     double length = piece.length, turning = piece.turning;
     if (piece.partner >= 0) {
       const Piece& other = pieces_[as_index(piece.partner)];
       length = std::sqrt(length * other.length);
       turning = std::max(turning, other.turning);
     }
-    const double by_length = std::floor(length / edge_ + 0.5 - kRounding);
+    const double by_length = parts_of(length, edge_);
     const double by_turn = std::min(std::ceil(turning / kMostTurn - kRounding),
                                     std::ceil(2 * length / edge_ - kRounding));
     return static_cast<int>(std::max({1.0, by_length, by_turn}));

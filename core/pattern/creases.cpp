@@ -89,7 +89,7 @@ std::vector<Vector2d> follow(const std::vector<Vector2d>& line, double edge,
     double length = 0;
     for (std::size_t i = 1; i < piece.size(); ++i) length += (piece[i] - piece[i - 1]).norm();
     if (length == 0) continue;
-    const double count = std::max(1.0, std::floor(length / edge + 0.5 - 1e-6));
+    const double count = std::max(1.0, parts_of(length, edge));
     double along = 0;
     int next = 1;
     for (std::size_t i = 1; i < piece.size(); ++i) {

@@ -12,6 +12,13 @@
 
 namespace weft {
 
+// How many lines of about `edge` a length is; where two counts fit as well, the lesser, whatever
+// rounding says.
+inline double parts_of(double length, double edge) {
+  constexpr double kRounding = 1e-6;
+  return std::floor(length / edge + 0.5 - kRounding);
+}
+
 // The lines that triangles of a panel have edges along. They are numbered: the border's, each from
 // the point of that number to the next, then those of one crease after the other.
 struct PanelLines {

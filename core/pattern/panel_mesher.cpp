@@ -201,7 +201,7 @@ std::optional<Half> right_half(const PanelLines& whole, const Mirror& mirror,
   for (std::size_t n = on_axis.size() - 1; n > 0; --n) {
     const double from = height(on_axis[n - 1]), length = height(on_axis[n]) - from;
     const bool one = creased.contains(std::minmax(on_axis[n - 1], on_axis[n]));
-    const double lines = one ? 1 : std::max(1.0, std::floor(length / edge + 0.5 - 1e-6));
+    const double lines = one ? 1 : std::max(1.0, parts_of(length, edge));
     if (on_axis.size() == 2) half.step = length / lines;
     for (double k = lines - 1; k > 0; --k) {
       outline.emplace_back(mirror.axis, from + k * length / lines);

@@ -67,6 +67,7 @@ struct NamedAccuracy {
   Accuracy accuracy;
   std::optional<StepBound> step_bound{};
   std::optional<IntegratorKind> integrator{};
+  std::optional<double> self_weight_strain{};
 };
 Outcome run(const Case& given, const NamedAccuracy& stated, int frames);
 

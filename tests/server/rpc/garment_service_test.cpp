@@ -101,6 +101,29 @@ TEST(GarmentService, ShouldersCarryAGarmentThatHasThemNotItsWaist) {
   EXPECT_EQ(garment.dressing().holds_size(), 0);
 }
 
+TEST(GarmentService, ShouldersCarryADressHoweverWideItsSkirt) {
+  Service service;
+  v1::BuildGarmentRequest request = vest();
+  v1::Pattern& pattern = *request.mutable_pattern();
+  for (const int side : {0, 1}) {
+    const v1::PatternPanel above = pattern.panels(side);
+    v1::PatternPanel* panel = pattern.add_panels();
+    panel->set_name(above.name() + "_skirt");
+    *panel->mutable_placement() = above.placement();
+    for (const auto& [u, v] : {std::pair(1.75, -1.0), {0.5, 0.0}, {0.0, 0.0}, {-1.25, -1.0}}) {
+      v1::PatternEdge* edge = panel->add_edges();
+      edge->add_points_m(u);
+      edge->add_points_m(v);
+    }
+    sew(pattern, panel->name(), 2, above.name(), 0);
+  }
+  sew(pattern, "front_skirt", 1, "back_skirt", 3);
+  sew(pattern, "front_skirt", 3, "back_skirt", 1);
+  const auto [dress, error] = build(service, request);
+  ASSERT_EQ(error.code, grpc::StatusCode::OK) << error.message;
+  EXPECT_EQ(dress.dressing().holds_size(), 0);
+}
+
 TEST(GarmentService, BuildsASheetThatCanBeSimulatedAndSaysWhichParticlesEdgesHave) {
   Service service;
   const auto [garment, error] = build(service, skirt());

@@ -135,8 +135,8 @@ create   template, with the options of `weft scene new`, or scene, or drape;
          fields: {PLACE: VALUE ...};
          drape is a garment or a pattern file, with what `weft drape` takes:
          textile, figure, size, stature_m, bust_m, underbust_m, waist_m,
-         top_hip_m, hip_m, arm_angle, or body, files; edge_m, deflate_m,
-         accuracy
+         top_hip_m, hip_m, arm_angle, or body, files; over, a recording;
+         edge_m, deflate_m, accuracy
 set      textile, a preset or file, or fields: {FIELD: VALUE ...};
          sheet; over_s, else at once
 grab     row, column; sheet; likewise release, pin and unpin

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "client/garments/layers.h"
 #include "client/input_file.h"
 #include "client/message_field.h"
 #include "client/output/text.h"
@@ -254,7 +255,12 @@ class ScriptReader {
       drape.bodies.push_back(from_here(file));
       try_to(fields, "body", [&] { garment_body(drape.bodies.back()); });
     }
-    only_for("drape", {"edge_m", "deflate_m", "body"}, fields);
+    if (const auto beneath = fields.text("over")) {
+      if (fields.has("body")) fields.fault("over", "excludes body: the recording has its own");
+      drape.over = from_here(*beneath);
+      try_to(fields, "over", [&] { worn_at_end(drape.over); });
+    }
+    only_for("drape", {"edge_m", "deflate_m", "body", "over"}, fields);
     return drape;
   }
 

@@ -109,6 +109,33 @@ TEST_F(Drape, OfWhatFitsIsGoodAndIsWritten) {
     EXPECT_TRUE(std::filesystem::exists(path(file))) << file;
 }
 
+TEST_F(Drape, InAScriptGoesOverWhatARecordingHas) {
+  ASSERT_EQ(drape(0.62, {"--recording", path("worn.weft")}).exit, 0);
+  write_file(path("tube.json"), client::pattern_text(tube_pattern(0.65, 0.1)));
+  const auto script = [&](const std::string& create) {
+    write_file(path("layers.yaml"),
+               "steps:\n"
+               "  - create: {drape: tube.json, edge_m: 0.03, " +
+                   create +
+                   "}\n"
+                   "  - record: {file: both.weft}\n"
+                   "  - run: {until_time_s: 0.5}\n");
+    return weft({"script", path("layers.yaml")});
+  };
+  const Outcome outcome = script("over: worn.weft");
+  ASSERT_EQ(outcome.exit, 0) << outcome.err;
+  client::RecordingReader recording(path("both.weft"));
+  ASSERT_EQ(recording.header().sheets_size(), 2);
+  EXPECT_EQ(recording.header().sheets(0).name(), "tube");
+  EXPECT_EQ(recording.header().sheets(1).name(), "tube-2");
+
+  EXPECT_THAT(script("over: worn.weft, body: pole.obj").err,
+              HasSubstr("create.over: excludes body: the recording has its own"));
+  EXPECT_THAT(script("over: pole.obj").err, HasSubstr("create.over: "));
+  write_file(path("alone.yaml"), "steps:\n  - create: {template: flag, over: worn.weft}\n");
+  EXPECT_THAT(weft({"script", path("alone.yaml")}).err, HasSubstr("create.over: is for a drape"));
+}
+
 TEST_F(Drape, OverWhatIsWornStaysOutsideOfIt) {
   ASSERT_EQ(drape(0.62, {"--recording", path("tube.weft")}).exit, 0);
   const auto over = [&](const std::string& beneath, std::vector<std::string> options) {

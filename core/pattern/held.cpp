@@ -61,7 +61,7 @@ double share_above(const TriangleMesh& mesh, double height) {
 
 // Empty where shoulders are: cloth above it, or another border beside it, as of an armhole.
 std::vector<int> highest_border(const TriangleMesh& mesh) {
-  constexpr double kHardlyAny = 0.05;
+  constexpr double kHardlyAny = 0.05;  // of the area
   const std::vector<std::vector<int>> borders = borders_of(mesh);
   std::vector<Heights> heights;
   for (const std::vector<int>& border : borders) heights.push_back(heights_of(mesh, border));

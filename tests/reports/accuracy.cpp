@@ -254,8 +254,7 @@ class AccuracyPage {
         "DRAFT is {} mm off and takes {} times what STANDARD does; STANDARD is {} mm off; FINE is "
         "{} mm off and takes {} times as long; with UNSHEARED STANDARD is {} mm off and takes {} "
         "times what it does else, with VERLET_LAGGED as well {} mm and {} times; DRAFT with 0.13 % "
-        "is "
-        "{} mm off and takes {} times.",
+        "is {} mm off and takes {} times.",
         error[0].text(1e-3), time[0].text(), error[1].text(1e-3), error[2].text(1e-3),
         time[2].text(), error[3].text(1e-3), time[3].text(), error[4].text(1e-3), time[4].text(),
         error[5].text(1e-3), time[5].text()));

@@ -113,13 +113,13 @@ TEST_F(Drape, InAScriptGoesOverWhatARecordingHas) {
   ASSERT_EQ(drape(0.62, {"--recording", path("worn.weft")}).exit, 0);
   write_file(path("tube.json"), client::pattern_text(tube_pattern(0.65, 0.1)));
   const auto script = [&](const std::string& create) {
-    write_file(path("layers.yaml"),
-               "steps:\n"
-               "  - create: {drape: tube.json, edge_m: 0.03, " +
-                   create +
-                   "}\n"
-                   "  - record: {file: both.weft}\n"
-                   "  - run: {until_time_s: 0.5}\n");
+    write_file(path("layers.yaml"), R"(
+steps:
+  - create: {drape: tube.json, edge_m: 0.03, )" +
+                                        create + R"(}
+  - record: {file: both.weft}
+  - run: {until_time_s: 0.5}
+)");
     return weft({"script", path("layers.yaml")});
   };
   const Outcome outcome = script("over: worn.weft");
@@ -131,7 +131,8 @@ TEST_F(Drape, InAScriptGoesOverWhatARecordingHas) {
 
   EXPECT_THAT(script("over: worn.weft, body: pole.obj").err,
               HasSubstr("create.over: excludes body: the recording has its own"));
-  EXPECT_THAT(script("over: pole.obj").err, HasSubstr("create.over: "));
+  EXPECT_THAT(script("over: pole.obj").err,
+              AllOf(HasSubstr("create.over: "), HasSubstr("pole.obj")));
   write_file(path("alone.yaml"), "steps:\n  - create: {template: flag, over: worn.weft}\n");
   EXPECT_THAT(weft({"script", path("alone.yaml")}).err, HasSubstr("create.over: is for a drape"));
 }

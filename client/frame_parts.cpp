@@ -60,12 +60,14 @@ bool TopologyParts::join(v1::Topology& part) {
   mesh.mutable_flat_m()->append(part.mesh().flat_m());
   mesh.mutable_flat_triangles()->append(part.mesh().flat_triangles());
   mesh.mutable_panels()->MergeFrom(part.mesh().panels());
+  mesh.mutable_folds()->MergeFrom(part.mesh().folds());
 
   const v1::SheetLayout& sheet = header_.sheets(part.sheet());
   const std::size_t most = (particle_count(sheet) + 3 * triangle_count(sheet)) * 2 * sizeof(float);
   check(mesh.triangles().size() <= most && mesh.flat_m().size() <= most &&
         mesh.flat_triangles().size() <= most &&
-        static_cast<std::size_t>(mesh.panels_size()) <= triangle_count(sheet));
+        static_cast<std::size_t>(mesh.panels_size()) <= triangle_count(sheet) &&
+        static_cast<std::size_t>(mesh.folds_size()) <= 3 * triangle_count(sheet));
   if (continued_) return false;
   check(is_sound(mesh, sheet));
   *part.mutable_mesh() = mesh;

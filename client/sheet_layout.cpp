@@ -131,7 +131,19 @@ bool is_sound(const v1::MeshData& mesh, const v1::SheetLayout& sheet) {
     if (panel.triangle_count() <= 0 || panel.name().empty()) return false;
     in_panels += panel.triangle_count();
   }
-  return are_triangles(mesh.triangles(), triangles, particle_count(sheet)) &&
+  // each edge is in one fold at most
+  std::size_t in_folds = 0;
+  for (const auto& fold : mesh.folds()) {
+    in_folds += static_cast<std::size_t>(fold.particles_size());
+    const auto is_there = [&](int i) {
+      return i >= 0 && static_cast<std::size_t>(i) < particle_count(sheet);
+    };
+    if (fold.particles_size() < 2 || !std::isfinite(fold.angle_rad()) ||
+        !std::all_of(fold.particles().begin(), fold.particles().end(), is_there))
+      return false;
+  }
+  return in_folds <= 3 * triangles &&
+         are_triangles(mesh.triangles(), triangles, particle_count(sheet)) &&
          mesh.flat_m().size() % (2 * sizeof(float)) == 0 &&
          std::all_of(flat.begin(), flat.end(), [](float value) { return std::isfinite(value); }) &&
          (own_corners ? are_triangles(mesh.flat_triangles(), triangles, corners)

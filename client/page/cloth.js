@@ -74,7 +74,7 @@ class Lattice {
   }
 }
 
-// The message MeshData in protobuf JSON; the lines are its borders and seams.
+// The message MeshData in protobuf JSON; the lines are its borders and seams, and folds what it is pressed along.
 class Mesh {
   constructor(sheet) {
     this.sheet = sheet;
@@ -111,7 +111,11 @@ class Mesh {
       }
       this.reach = Math.max(this.reach, ...box.getSize(new THREE.Vector2()).toArray());
     });
-    this.lines = [...open.keys()].flatMap((edge) => edge.split(',').map((i) => first_particle + Number(i)));
+    this.folds = (mesh.folds ?? []).flatMap(({particles}) =>
+      particles.slice(1).flatMap((i, k) => [first_particle + particles[k], first_particle + i]));
+    const lines = [...open.keys()].map((edge) => edge.split(',').map((i) => first_particle + Number(i)));
+    const folded = new Set(pairsOf(this.folds).map(keyOf));
+    this.lines = lines.filter((edge) => !folded.has(keyOf(edge))).flat();
   }
 }
 
@@ -121,6 +125,7 @@ class Cloth {
     this.parts = sheets.map((sheet) => (sheet.mesh ? new Mesh(sheet) : new Lattice(sheet)));
     this.threads = this.parts.flatMap((part) => (part instanceof Lattice ? part.lines : []));
     this.edges = this.parts.flatMap((part) => (part instanceof Mesh ? part.lines : []));
+    this.folds = this.parts.flatMap(({folds = []}) => folds);
     this.pins = sheets.flatMap(({first_particle, pinned}) => pinned.map((i) => first_particle + i));
     const count = this.parts.reduce((sum, {triangles}) => sum + triangles.length / 3, 0);
     this.triangles = new Uint32Array(3 * count);

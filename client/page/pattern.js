@@ -6,6 +6,9 @@ class Pattern {
     this.cloth = cloth;
     const places = [];  // as they are given
     const outlines = [];
+    const folds = [];
+    const folded = new Set(pairsOf(cloth.folds).map(keyOf));
+    const isFolded = (edge) => folded.size > 0 && folded.has(keyOf(edge.map((i) => this.particles[i])));
     this.particles = [];  // of each vertex
     this.index = new Uint32Array(cloth.triangles.length);
     this.boxes = [];
@@ -28,14 +31,15 @@ class Pattern {
         for (let k = 0; k < 3; ++k) {
           const edge = [this.index[t + k], this.index[t + (k + 1) % 3]].sort((a, b) => a - b);
           if (!open.delete(edge.join())) open.set(edge.join(), edge);
+          if (isFolded(edge)) folds.push(...edge);
         }
       }
-      outlines.push(...[...open.values()].flat());
+      outlines.push(...[...open.values()].filter((edge) => !isFolded(edge)).flat());
       this.boxes.push({box, size: box.getSize(new THREE.Vector2()), vertices: [...vertices.values()]});
     }
     const touching = ({box: a}, {box: b}) => a.min.x < b.max.x && b.min.x < a.max.x && a.min.y < b.max.y && b.min.y < a.max.y;
     this.apart = this.boxes.every((one, k) => this.boxes.slice(k + 1).every((other) => !touching(one, other)));
-    this.build(places, outlines);
+    this.build(places, outlines, folds);
   }
 
   // As they lie where none is over another; else in rows, the highest first, to be seen as large as may be in a picture
@@ -65,7 +69,7 @@ class Pattern {
     box.translate(new THREE.Vector2(dx, dy));
   }
 
-  build(places, outlines) {
+  build(places, outlines, folds) {
     const position = this.position = new THREE.Float32BufferAttribute(places, 3);
     this.colour = new THREE.Float32BufferAttribute(new Float32Array(places.length), 3);
     this.surface = new THREE.BufferGeometry();
@@ -78,13 +82,15 @@ class Pattern {
     this.coloured = material({vertexColors: THREE.VertexColors});
     this.panels = this.cloth.panels.map(() => material());
     this.mesh = new THREE.Mesh(this.surface, this.plain);
-    const lines = new THREE.BufferGeometry();
-    lines.setAttribute('position', position);
-    lines.setIndex(outlines);
-    this.lines = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({transparent: true, opacity: 0.7}));
+    [this.lines, this.folds] = [outlines, folds].map((index) => {
+      const lines = new THREE.BufferGeometry();
+      lines.setAttribute('position', position);
+      lines.setIndex(index);
+      return new THREE.LineSegments(lines, new THREE.LineBasicMaterial({transparent: true, opacity: 0.7}));
+    });
     this.mark = markOf();
     this.scene = new THREE.Scene();
-    this.scene.add(this.mesh, this.lines, this.mark);
+    this.scene.add(this.mesh, this.lines, this.folds, this.mark);
     this.camera = new THREE.OrthographicCamera(-1, 1, 1, -1, -1, 1);
   }
 
@@ -109,6 +115,10 @@ class Pattern {
     this.colour.needsUpdate = true;
   }
 }
+
+const keyOf = (edge) => edge.sort((a, b) => a - b).join();
+// Both ends of each line.
+const pairsOf = (lines) => Array.from({length: lines.length / 2}, (_, k) => [lines[2 * k], lines[2 * k + 1]]);
 
 // Upper left corners of panels in rows that are as wide at most, and how large all of it is.
 function rowsOf(panels, gap, most) {

@@ -265,6 +265,11 @@ v1::MeshData topology_of(const SheetShape& shape) {
       added->set_triangle_count(panel.triangles);
       added->set_grain_rad(panel.grain);
     }
+    for (const Fold& fold : (*mesh)->folds) {
+      v1::Fold* added = to.add_folds();
+      added->mutable_particles()->Assign(fold.particles.begin(), fold.particles.end());
+      added->set_angle_rad(fold.angle);
+    }
   } else {
     for (int i = 0; i < particle_count(shape); ++i) {
       const Vector3d at = local_position(shape, i);
@@ -278,11 +283,6 @@ v1::MeshData topology_of(const SheetShape& shape) {
 v1::MeshData to_proto(const Triangles& mesh) {
   v1::MeshData to = topology_of(mesh);
   to.set_positions_m(planes_of(mesh->start));
-  for (const Fold& fold : mesh->folds) {
-    v1::Fold* added = to.add_folds();
-    added->mutable_particles()->Assign(fold.particles.begin(), fold.particles.end());
-    added->set_angle_rad(fold.angle);
-  }
   return to;
 }
 

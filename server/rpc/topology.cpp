@@ -12,25 +12,41 @@
 namespace weft {
 namespace {
 
-// Its arrays, joined, are the sheet's.
+// So long that each fits into any message; a piece begins where the one before it ends.
+std::vector<v1::Fold> pieces_of(const v1::Fold& fold) {
+  constexpr int kMost = 200;  // edges
+  std::vector<v1::Fold> pieces;
+  for (int begin = 0; begin + 1 < fold.particles_size(); begin += kMost) {
+    v1::Fold& piece = pieces.emplace_back();
+    piece.set_angle_rad(fold.angle_rad());
+    const auto first = fold.particles().begin() + begin;
+    const int count = std::min(kMost + 1, fold.particles_size() - begin);
+    piece.mutable_particles()->Assign(first, first + count);
+  }
+  return pieces;
+}
+
+// Its arrays and folds, joined, are the sheet's.
 std::vector<v1::Topology> in_parts(v1::Topology whole, std::int64_t most_bytes) {
   constexpr std::size_t kRest = 64;  // sheet, tags and lengths
-  const std::size_t panels = whole.ByteSizeLong() - whole.mesh().triangles().size() -
-                             whole.mesh().flat_m().size() - whole.mesh().flat_triangles().size();
+  constexpr std::size_t kTags = 8;   // of a panel or a fold
+  const v1::MeshData mesh = std::move(*whole.mutable_mesh());
+  std::size_t panels = 0;
+  for (const v1::Panel& panel : mesh.panels()) panels += kTags + panel.ByteSizeLong();
   const auto most = static_cast<std::size_t>(most_bytes);
   const std::size_t room = std::max(most / 2, most - std::min(most, kRest + panels));
-  const v1::MeshData mesh = std::move(*whole.mutable_mesh());
   whole.clear_mesh();
   std::vector<v1::Topology> parts{whole};
   *parts.back().mutable_mesh()->mutable_panels() = mesh.panels();
   std::size_t left = room;
+  const auto begin_next = [&] {
+    parts.back().set_continued(true);
+    parts.push_back(whole);
+    left = room;
+  };
   const auto append = [&](const std::string& array, auto field) {
     for (std::size_t from = 0; from < array.size();) {
-      if (left == 0) {
-        parts.back().set_continued(true);
-        parts.push_back(whole);
-        left = room;
-      }
+      if (left == 0) begin_next();
       const std::size_t count = std::min(left, array.size() - from);
       (parts.back().mutable_mesh()->*field)()->assign(array, from, count);
       from += count;
@@ -40,6 +56,13 @@ std::vector<v1::Topology> in_parts(v1::Topology whole, std::int64_t most_bytes) 
   append(mesh.triangles(), &v1::MeshData::mutable_triangles);
   append(mesh.flat_m(), &v1::MeshData::mutable_flat_m);
   append(mesh.flat_triangles(), &v1::MeshData::mutable_flat_triangles);
+  for (const v1::Fold& fold : mesh.folds())
+    for (v1::Fold& piece : pieces_of(fold)) {
+      const std::size_t bytes = kTags + piece.ByteSizeLong();
+      if (left < bytes) begin_next();
+      left -= std::min(left, bytes);
+      *parts.back().mutable_mesh()->add_folds() = std::move(piece);
+    }
   return parts;
 }
 

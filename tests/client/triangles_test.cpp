@@ -135,6 +135,33 @@ TEST_F(SheetsOfTriangles, CanBeRunAgainFromTheirRecording) {
   EXPECT_EQ(ask({"diff", file_, path("again.weft")})["bit_equal"], true);
 }
 
+TEST_F(SheetsOfTriangles, ComeWithTheirFoldsALongOneInPieces) {
+  constexpr int kCells = 16, kPoints = kCells + 1;
+  v1::MeshData mesh = square_mesh(kCells);
+  std::vector<int> line;  // to and fro over the rows
+  for (int row = 1; row < kCells; ++row)
+    for (int k = 1; k < kCells; ++k) line.push_back(row * kPoints + (row % 2 ? k : kCells - k));
+  v1::Fold* fold = mesh.add_folds();
+  fold->mutable_particles()->Assign(line.begin(), line.end());
+  fold->set_angle_rad(0.5);
+  ServerOptions options;
+  options.limits.max_frame_bytes = 1024;
+  Service narrow(options);
+  narrow.create(scene_of(mesh), "pressed");
+  const Outcome recorded = run_weft({"record", "pressed", "--run", "--to", "2", "-o",
+                                     path("pressed.weft"), "--server", narrow.server.address()});
+  ASSERT_EQ(recorded.exit, 0) << recorded.err;
+  const auto folds = RecordingReader(path("pressed.weft")).topology()[0].folds();
+  EXPECT_EQ(folds.size(), 2);
+  std::vector<int> joined{line.front()};
+  for (const v1::Fold& piece : folds) {
+    EXPECT_EQ(piece.angle_rad(), 0.5);
+    EXPECT_EQ(piece.particles(0), joined.back());
+    joined.insert(joined.end(), piece.particles().begin() + 1, piece.particles().end());
+  }
+  EXPECT_EQ(joined, line);
+}
+
 TEST_F(SheetsOfTriangles, ComeInSeveralMessagesWhereTheyAreLarge) {
   ServerOptions options;
   options.limits.max_frame_bytes = 1024;

@@ -5,7 +5,8 @@ const kAskew = Math.PI / 4;
 
 const base64 = (array) => Buffer.from(array.buffer).toString('base64');
 
-export function sewn() {
+// pressed: along the seam.
+export function sewn(pressed = false) {
   const middle = (kPoints - 1) / 2 - 0.5;  // column of the seam
   const random = ((state) => () => (state = (state * 16807) % 2147483647) / 2147483647)(7);
   const inside = (k) => k > 0 && k < kPoints - 1;
@@ -47,6 +48,7 @@ export function sewn() {
         flat_triangles: base64(flat.map((corner) => place.get(corner))),
         panels: [{name: 'left', triangle_count: used[0].length / 3},
           {name: 'right', triangle_count: used[1].length / 3, grain_rad: kAskew / 2}],
+        ...(pressed && {folds: [{particles: Array.from({length: kPoints}, (_, row) => row * kPoints + middle), angle_rad: 1.5}]}),
       }},
       textile: {preset: 'wool_tropical'},
       placement: {origin_m: {x: half, y: 0.16, z: half}},

@@ -74,6 +74,13 @@ v1::Action to_action(const SceneAction& action, const v1::Scene& scene) {
     set_target(action, move->mutable_offset_m(), move);
     return to;
   }
+  if (action.kind == "pose_collider") {
+    v1::PoseCollider* pose = to.mutable_pose_collider();
+    pose->set_collider(named(scene.colliders(), action.collider, "collider").name());
+    pose->set_pose_time_s(action.pose_time_s);
+    if (action.speed_m_per_s) pose->set_speed_m_per_s(*action.speed_m_per_s);
+    return to;
+  }
   const auto* field = v1::Action::descriptor()->FindFieldByName(action.kind);
   Message* part = to.GetReflection()->MutableMessage(&to, field);
   const auto set = [&](const char* name, const auto& value, auto setter) {

@@ -29,6 +29,8 @@ struct SceneAction {
   ParticlePlace particle{};
   std::optional<std::array<double, 3>> target_m{};  // of a collider as an offset from its start
   std::optional<double> duration_s{};
+  double pose_time_s = 0;  // where a body is led to among its poses
+  std::optional<double> speed_m_per_s{};
 };
 
 // Throws where the scene has no such particle or collider.

@@ -37,7 +37,7 @@ PositionPlanes planes_of(const std::vector<double>& positions) {
   return {positions.data(), static_cast<Eigen::Index>(positions.size() / 3), 3};
 }
 
-// A body between two poses.
+// A body between two poses, at a time of these.
 BodyMesh mesh_at(const Collider& collider, double time) {
   const Poses& poses = *collider.poses;
   BodyMesh mesh{{}, std::get<SharedBody>(collider.shape)->mesh.triangles};
@@ -138,7 +138,7 @@ std::vector<double> FrameMeter::pressures(const std::shared_ptr<const Scene>& sc
                                           const std::vector<double>& positions, double time) {
   const std::lock_guard lock(mutex_);
   take(scene, time);
-  bodies_.place(time, 0);
+  bodies_.place(scene->colliders, time, 0);
   std::vector<double> values;
   for_each_sheet(positions, [&](std::size_t s, const Matrix3Xd& x) {
     const VectorXd found = weft::pressures(*scene, bodies_, definitions_[s], sheets_[s], x, time);
@@ -150,7 +150,7 @@ std::vector<double> FrameMeter::pressures(const std::shared_ptr<const Scene>& sc
 std::vector<double> FrameMeter::clearances(const std::shared_ptr<const Scene>& scene,
                                            const std::vector<double>& positions, double time) {
   const std::lock_guard lock(mutex_);
-  bodies_.place(time, 0);
+  bodies_.place(scene->colliders, time, 0);
   const double deflate = scene->dressing ? dressing_at(*scene->dressing, time).deflate : 0;
   const PositionPlanes all = planes_of(positions);
   std::vector<double> values(static_cast<std::size_t>(all.rows()));
@@ -173,7 +173,7 @@ double FrameMeter::clearance(const Scene& scene, const Vector3d& x, double time,
       // a guess makes it quick: where it was, or where its neighbour is
       int& nearest = surface.nearest[particle];
       if (nearest < 0) nearest = particle > 0 ? surface.nearest[particle - 1] : 0;
-      const auto found = tree_of(collider, surface, time).nearest(at, nearest);
+      const auto found = tree_of(collider, surface, pose_time(collider, time)).nearest(at, nearest);
       nearest = found.triangle;
       value = std::copysign(std::sqrt(found.squared), value);
     }

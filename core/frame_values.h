@@ -61,7 +61,7 @@ class FrameMeter {
   struct Surface {
     BodyMesh mesh;
     std::unique_ptr<TriangleTree> tree;
-    double time = 0;
+    double time = 0;           // among its poses, s
     std::vector<int> nearest;  // triangle of each particle when it was last asked for, or -1
   };
 

@@ -110,7 +110,10 @@ double end_of_motion(const Scene& scene) {
     for (const Pin& pin : sheet.pins) include(pin.path);
   for (const Collider& collider : scene.colliders) {
     include(collider.path);
-    if (collider.poses) end = std::max(end, collider.poses->times.back());
+    if (collider.lead)
+      end = std::max(end, collider.lead->end);
+    else if (collider.poses)
+      end = std::max(end, collider.poses->times.back());
   }
   return end;
 }

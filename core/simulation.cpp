@@ -87,7 +87,7 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
     if (!sheet.dynamics.tethers.empty()) sheet.solver->pull_back(pool);
   }
   if (scene.dressing) hold_heights(scene, time + dt, sheets);
-  if (!scene.colliders.empty()) bodies.place(time + dt, dt);
+  if (!scene.colliders.empty()) bodies.place(scene.colliders, time + dt, dt);
   for (std::size_t s = 0; s < open_seams.size(); ++s)
     open_seams[s].keep_out(contacts_of(s, time, dt), dt, sheets[s]);
   if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame);
@@ -458,7 +458,7 @@ std::shared_ptr<const Scene> Simulation::scene_of_frame() const {
 
 VectorXd Simulation::pressures(std::size_t sheet) const {
   state_->restore_memory();
-  state_->bodies.place(time(), 0);
+  state_->bodies.place(state_->scene.colliders, time(), 0);
   const MovingSheet& moving = state_->sheets[sheet];
   return weft::pressures(state_->scene, state_->bodies, state_->scene.sheets[sheet], moving,
                          moving.good().x, time());
@@ -466,7 +466,7 @@ VectorXd Simulation::pressures(std::size_t sheet) const {
 
 Verdict Simulation::verdict() const {
   state_->restore_memory();
-  state_->bodies.place(time(), 0);
+  state_->bodies.place(state_->scene.colliders, time(), 0);
   return judge(state_->scene, state_->bodies, state_->sheets, time(), at_rest());
 }
 

@@ -188,9 +188,12 @@ const Textile& Simulation::target_textile(std::size_t index) const {
 bool Simulation::textile_changed() const { return state_->textile_changed; }
 
 Constraints Simulation::State::constraints() const {
-  Constraints constraints{{}, {}, grips};
+  Constraints constraints{{}, {}, {}, grips};
   for (const SheetDefinition& sheet : scene.sheets) constraints.pins.push_back(sheet.pins);
-  for (const Collider& collider : scene.colliders) constraints.paths.push_back(collider.path);
+  for (const Collider& collider : scene.colliders) {
+    constraints.paths.push_back(collider.path);
+    constraints.leads.push_back(collider.lead);
+  }
   return constraints;
 }
 
@@ -200,8 +203,10 @@ void Simulation::State::adopt(Constraints constraints) {
     scene.sheets[s].pins = std::move(constraints.pins[s]);
     sheets[s].set_pins(scene.sheets[s]);
   }
-  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c) {
     scene.colliders[c].path = std::move(constraints.paths[c]);
+    scene.colliders[c].lead = constraints.leads[c];
+  }
   grips = std::move(constraints.grips);
   rest_after = end_of_motion(scene);
 }

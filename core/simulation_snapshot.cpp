@@ -29,8 +29,10 @@ bool Simulation::restore(const Snapshot& snapshot) {
     scene.sheets[s].textile = snapshot.sheets[s].textile;
     scene.sheets[s].pins = snapshot.constraints.pins[s];
   }
-  for (std::size_t c = 0; c < scene.colliders.size(); ++c)
+  for (std::size_t c = 0; c < scene.colliders.size(); ++c) {
     scene.colliders[c].path = snapshot.constraints.paths[c];
+    scene.colliders[c].lead = snapshot.constraints.leads[c];
+  }
   if (!find_problems(scene).empty()) return false;
   auto restored = std::make_unique<State>(std::move(scene), state_->make_solver);
   restored->repairs.limit_substeps(state_->repairs.most_substeps());

@@ -27,9 +27,20 @@ bool fits(const SheetDefinition& definition, const Snapshot::Sheet& sheet, std::
          sheet.x.allFinite() && sheet.v.allFinite() && sheet.most_strain >= kMostStrain;
 }
 
+bool fits(const Collider& collider, const std::optional<PoseLead>& lead) {
+  if (!lead) return true;
+  if (!collider.poses) return false;
+  const auto& times = collider.poses->times;
+  const auto within = [&](double time) { return time >= times.front() && time <= times.back(); };
+  return lead->begin >= 0 && lead->end >= lead->begin && within(lead->from) && within(lead->to);
+}
+
 bool fits(const Scene& scene, const Constraints& constraints) {
+  const auto& leads = constraints.leads;
   return constraints.pins.size() == scene.sheets.size() &&
          constraints.paths.size() == scene.colliders.size() &&
+         std::equal(scene.colliders.begin(), scene.colliders.end(), leads.begin(), leads.end(),
+                    [](const auto& collider, const auto& lead) { return fits(collider, lead); }) &&
          std::all_of(constraints.grips.begin(), constraints.grips.end(), [&](const Grip& grip) {
            return grip.sheet < scene.sheets.size() && grip.particle >= 0 &&
                   grip.particle < scene.sheets[grip.sheet].particle_count();

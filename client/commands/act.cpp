@@ -35,8 +35,8 @@ void run_act(Context& context, ActOptions options) {
 }  // namespace
 
 void add_act(CLI::App& app, Context& context) {
-  CLI::App* act =
-      add_group(app, "act", "Grab, drag, release and pin particles, move colliders, and relax");
+  CLI::App* act = add_group(
+      app, "act", "Grab, drag, release and pin particles, move and pose colliders, and relax");
   const auto add = [&](const char* name, const char* kind, const char* description) {
     auto options = std::make_shared<ActOptions>();
     options->action.kind = kind;
@@ -77,6 +77,17 @@ void add_act(CLI::App& app, Context& context) {
       ->add_option("COLLIDER", move.second->action.collider, "Its name, where there are several")
       ->option_text(" ");
   add_target(move, "Where to, as an offset from its start, m")->required();
+  const auto pose =
+      add("pose", "pose_collider", "Lead a body through its poses, and let it stay there");
+  SceneAction& posed = pose.second->action;
+  pose.first->add_option("COLLIDER", posed.collider, "Its name, where there are several")
+      ->option_text(" ");
+  pose.first->add_option("--to", posed.pose_time_s, "Where to, among the times of its poses")
+      ->type_name("SECONDS")
+      ->required();
+  pose.first
+      ->add_option("--speed", posed.speed_m_per_s, "Of its fastest vertex, m/s, 0.01 to 20; else 1")
+      ->type_name("NUMBER");
 }
 
 }  // namespace weft::client

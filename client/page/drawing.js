@@ -97,6 +97,9 @@ class Solid {
   }
 }
 
+// Those that move through poses; frames say where they are among these in this order.
+const posedOf = (colliders) => colliders.filter(({mesh}) => mesh?.data?.poses?.times_s);
+
 // The shape of a collider as a mesh where it starts; a plane is shown as far as `reach`.
 function colliderMesh(collider, material, centre, reach) {
   const add = (group, geometry, at) => {
@@ -263,7 +266,7 @@ class Pane {
       this.cloth.add(mesh);
     }
     this.lines = new THREE.Group();
-    for (const [lines, opacity] of [[cloth.threads, 0.25], [cloth.edges, 0.7]]) {
+    for (const [lines, opacity] of [[cloth.threads, 0.25], [cloth.edges, 0.7], [cloth.folds, 0.9]]) {
       this.lines.add(new THREE.LineSegments(geometry(lines), new THREE.LineBasicMaterial({transparent: true, opacity})));
     }
     this.lines.visible = false;
@@ -296,8 +299,8 @@ class Pane {
       }
     }
     const lines = (kind) => parts.flatMap((part) => (part instanceof kind ? part.lines : []));
-    [Lattice, Mesh].forEach((kind, k) => this.lines.children[k].geometry.setIndex(
-      new THREE.BufferAttribute(Uint32Array.from(lines(kind)), 1)));
+    [lines(Lattice), lines(Mesh), parts.flatMap(({folds = []}) => folds)].forEach((index, k) =>
+      this.lines.children[k].geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(index), 1)));
     this.pins.visible = hidden.size === 0;
   }
 
@@ -351,10 +354,11 @@ class Pane {
     // drawn a little behind its place, so that cloth that lies on it hides it
     this.bodyMaterial = new THREE.MeshLambertMaterial(
       {polygonOffset: true, polygonOffsetFactor: 4, polygonOffsetUnits: 4});
+    const posed = posedOf(this.source.colliders);
     this.bodies = this.source.colliders.map((collider) => {
       const mesh = colliderMesh(collider, this.bodyMaterial, centre, 2.5 * radius);
       this.scene.add(mesh);
-      return {mesh, path: collider.path};
+      return {mesh, path: collider.path, posed: posed.indexOf(collider)};
     });
   }
 
@@ -392,8 +396,9 @@ class Pane {
     this.faces[1].plain.color.copy(linear(style('--cloth-back')));
     this.bodyMaterial.color.copy(linear(style('--body')));
     this.grid.material.color.copy(linear(style('--grid')));
-    for (const {material} of this.lines.children) material.color.copy(linear(style('--lines')));
-    this.flat?.lines.material.color.copy(linear(style('--lines')));
+    const [threads, edges, folds] = this.lines.children;
+    for (const each of [threads, edges, this.flat?.lines]) each?.material.color.copy(linear(style('--lines')));
+    for (const each of [folds, this.flat?.folds]) each?.material.color.copy(linear(style('--folds')));
     const points = [this.pins, this.held, this.mark, this.flat?.mark];
     for (const each of points) each?.material.color.copy(linear(style('--accent')));
   }
@@ -407,9 +412,9 @@ class Pane {
     this.source.cloth.writeNormals(this.normal.array, this.position.array);
     kQuantities[quantity]?.write(this.source, this.values, this.position.array, place.frame);
     this.position.needsUpdate = this.normal.needsUpdate = true;
-    for (const {mesh, path} of this.bodies) {
+    for (const {mesh, path, posed} of this.bodies) {
       mesh.position.copy(pathOffset(path, t));
-      mesh.solid?.show(t);
+      mesh.solid?.show(this.source.poseTime(posed, t, place));
     }
   }
 

@@ -131,6 +131,7 @@ class Live extends Stage {
     }
     this.textile.show(sight.session.scene.sheets);
     for (const id of ['textile', 'judged', 'now-shown']) $(id).hidden = false;
+    if (!again) this.offerPoses();
     if (!again) {
       $('verdicts').replaceChildren();
       this.judgedRest = undefined;
@@ -157,6 +158,7 @@ class Live extends Stage {
 
   showFrame(frame) {
     kCurrent.forEach(([, text], k) => { this.cells[k].textContent = text(frame).replaceAll(' ', '\u00a0'); });
+    this.showPoses(frame);
     const {phase} = this.sight;
     $('clock').textContent = `frame ${frame.number}, ${frame.time_s.toFixed(3)} s`;
     this.showName(phase);
@@ -164,6 +166,50 @@ class Live extends Stage {
     const {at_rest} = frame.stats;
     if (at_rest && !this.judgedRest && phase) this.judge();
     this.judgedRest = at_rest;
+  }
+
+  // A slider for each body that has poses: where it is among them, and where it is led to.
+  offerPoses() {
+    this.posed = posedOf(this.sight.colliders).map(({name, mesh: {data: {poses: {times_s}}}}) => {
+      const [first, last] = [times_s[0], times_s[times_s.length - 1]];
+      const input = Object.assign(document.createElement('input'),
+        {type: 'range', min: first, max: last, step: 'any', value: first, disabled: last === first, ariaLabel: `Pose of ${name}`});
+      const output = cell('output', '');
+      const lead = new Lead(this.name, name, (frame) => {
+        body.applied = frame;
+        doing(`Leads ${name} from frame ${frame} on${this.isRunning ? '' : ', when it runs'}.`);
+      });
+      const body = {name, input, output, first, last};
+      input.addEventListener('input', () => {
+        body.target = Number(input.value);
+        body.applied = undefined;
+        attempt(() => lead.to(body.target).catch((error) => {
+          body.target = undefined;  // it stays on its way
+          throw error;
+        }));
+      });
+      return body;
+    });
+    $('poses').replaceChildren(...this.posed.map(({name, input, output}) => {
+      const line = cell('label', '', {class: 'slider'});
+      line.append(cell('span', name), input, output);
+      return line;
+    }));
+    $('posed').hidden = this.posed.length === 0;
+  }
+
+  // Thumbs are where a body is led to until it is there, or another leads it elsewhere.
+  showPoses({number, time_s}) {
+    this.posed.forEach((body, k) => {
+      const {input, output, first, last} = body;
+      const at = Math.min(last, Math.max(first, this.sight.poseTime(k, time_s)));
+      output.textContent = `${at.toFixed(2)}\u00a0s`;
+      const left = Math.abs(at - body.target);
+      const strays = body.seen >= body.applied && number > body.seen && left >= body.left;
+      if (left < 1e-6 || strays) body.target = undefined;
+      if (body.target === undefined) input.value = at;
+      [body.seen, body.left] = [number, left];
+    });
   }
 
   judge() {

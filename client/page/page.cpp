@@ -163,7 +163,11 @@ double quantum_of(const std::vector<ClothMesh>& sheets, const Summary& summary) 
 
 Json stats_json(const std::vector<v1::FrameStats>& stats) {
   Json json;
+  const bool led = std::any_of(stats.begin(), stats.end(), [](const v1::FrameStats& frame) {
+    return frame.pose_times_s_size() > 0;
+  });
   for (const v1::FrameStats& frame : stats) {
+    if (led) json["pose_times_s"].push_back(frame.pose_times_s());
     json["kinetic_energy_j"].push_back(frame.kinetic_energy_j());
     json["potential_energy_j"].push_back(frame.potential_energy_j());
     json["largest_strain"].push_back(frame.largest_strain());

@@ -88,6 +88,13 @@ class Recording {
     return {frame, next, share: step > 0 ? Math.min(1, Math.max(0, (t - this.time_s[frame]) / step)) : 0};
   }
 
+  // Of a body with poses, s; those of actions go straight between frames.
+  poseTime(body, t, {frame, next, share}) {
+    const at = (k) => this.stats?.pose_times_s?.[k]?.[body] ?? this.time_s[k];
+    if (!this.stats?.pose_times_s) return t;
+    return at(frame) + share * (at(next) - at(frame));
+  }
+
   // Positions relative to origin_m.
   write(positions, {frame, next, share}) {
     const a = frame * this.values;

@@ -106,6 +106,9 @@ class Sight {
     this.frame = {...frame, positions: arrays.subarray(0, end), values: arrays.subarray(end)};
   }
 
+  // Of a body with poses, s.
+  poseTime(body, t) { return this.frame.stats.pose_times_s?.[body] ?? t; }
+
   sheetOf(particle) {
     return this.sheets.find((sheet) => particle < sheet.first_particle + particlesOf(sheet));
   }
@@ -169,6 +172,29 @@ class Sight {
   }
   get low_m() { return this.bounds.min.toArray(); }
   get high_m() { return this.bounds.max.toArray(); }
+}
+
+// Leads a body through its poses to the newest time of these it was given.
+class Lead {
+  constructor(name, collider, applied) {
+    Object.assign(this, {name, collider, applied});
+  }
+
+  async to(pose_time_s) {
+    this.next = pose_time_s;
+    if (this.sends) return;
+    this.sends = true;
+    try {
+      while (this.next !== undefined) {
+        const pose = {collider: this.collider, pose_time_s: this.next};
+        this.next = undefined;
+        const {applied_frame} = await session('ApplyActions', {name: this.name, actions: [{pose_collider: pose}]});
+        this.applied(applied_frame);
+      }
+    } finally {
+      this.sends = false;
+    }
+  }
 }
 
 // A hand that holds a particle and leads it to the newest place it was given. When it goes, it lets go.

@@ -30,6 +30,7 @@ std::shared_ptr<const Frame> frame_of(const v1::Frame& recorded, const v1::Strea
   frame->deformation = {stats.potential_energy_j(), stats.largest_strain()};
   if (stats.has_cloth_cut_count()) frame->cloth_cuts = stats.cloth_cut_count();
   if (stats.has_residual()) frame->residual = stats.residual();
+  frame->pose_times.assign(stats.pose_times_s().begin(), stats.pose_times_s().end());
   frame->at_rest = stats.at_rest();
   frame->substeps = stats.substep_count();
   frame->substep = stats.substep_s();

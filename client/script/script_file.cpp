@@ -421,11 +421,20 @@ class ScriptReader {
     return place;
   }
 
-  // "grab" ... of a particle, "move" of a collider, or "relax".
+  // "grab" ... of a particle, "move" or "pose" of a collider, or "relax".
   What read_act(Fields& fields, Scope&) {
     ActStep step{.session = read_session(fields), .action = {.kind = fields.place("")}};
     SceneAction& action = step.action;
     if (action.kind == "relax") return step;
+    if (action.kind == "pose") {
+      action.kind = "pose_collider";
+      action.collider = fields.text("collider").value_or("");
+      const auto time = fields.number("to_s", 0, 1e6);
+      if (!fields.has("to_s")) fields.fault("", "to_s is missing");
+      action.pose_time_s = time.value_or(0);
+      action.speed_m_per_s = fields.number("speed_m_per_s", 0.01, 20);
+      return step;
+    }
     const bool moves = action.kind == "move";
     if (moves) {
       action.kind = "move_collider";
@@ -585,7 +594,7 @@ class ScriptReader {
     const char* name;
     What (ScriptReader::*read)(Fields&, Scope&);
   };
-  static constexpr std::array<Kind, 16> kKinds{{{"create", &ScriptReader::read_create},
+  static constexpr std::array<Kind, 17> kKinds{{{"create", &ScriptReader::read_create},
                                                 {"set", &ScriptReader::read_set},
                                                 {"grab", &ScriptReader::read_act},
                                                 {"drag", &ScriptReader::read_act},
@@ -594,6 +603,7 @@ class ScriptReader {
                                                 {"unpin", &ScriptReader::read_act},
                                                 {"relax", &ScriptReader::read_act},
                                                 {"move", &ScriptReader::read_act},
+                                                {"pose", &ScriptReader::read_act},
                                                 {"run", &ScriptReader::read_run},
                                                 {"wait", &ScriptReader::read_wait},
                                                 {"pause", &ScriptReader::read_pause},

@@ -74,6 +74,7 @@ const std::map<std::string, Method>& methods() {
       {"/weft.v1.SessionService/StepSession", method(&Sessions::StepSession)},
       {"/weft.v1.SessionService/GetVerdict", method(&Sessions::GetVerdict)},
       {"/weft.v1.SessionService/UpdateTextile", method(&Sessions::UpdateTextile)},
+      {"/weft.v1.SessionService/ApplyActions", method(&Sessions::ApplyActions)},
       {"/weft.v1.TextileService/ListTextiles", method(&Textiles::ListTextiles)},
   };
   return all;

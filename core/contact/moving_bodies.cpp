@@ -47,8 +47,9 @@ MovingBodies::MovingBodies(std::span<const Collider> colliders) {
       bodies_[c] = {colliders[c].poses, std::get<SharedBody>(colliders[c].shape), {}, false, {}};
 }
 
-void MovingBodies::place(double time, double dt) {
-  for (auto& [collider, moving] : bodies_) place(moving, time, dt);
+void MovingBodies::place(std::span<const Collider> colliders, double time, double dt) {
+  for (auto& [collider, moving] : bodies_)
+    place(moving, pose_time(colliders[collider], time - dt), pose_time(colliders[collider], time));
 }
 
 const PosedBody* MovingBodies::of(std::size_t collider) const {
@@ -63,14 +64,15 @@ void MovingBodies::release_memory() {
   }
 }
 
-void MovingBodies::place(Moving& moving, double time, double dt) {
+void MovingBodies::place(Moving& moving, double begin, double end) {
   const Poses& poses = *moving.poses;
   const double first = poses.times.front(), last = poses.times.back();
-  const double end = std::clamp(time, first, last), begin = std::clamp(time - dt, first, last);
-  moving.is_posed = end > first;
+  begin = std::clamp(begin, first, last);
+  end = std::clamp(end, first, last);
+  moving.is_posed = std::max(begin, end) > first;
   if (!moving.is_posed) return;
   PosedBody& placed = moving.placed;
-  if (begin == last) {
+  if (begin == last && end == last) {
     const At at{poses.times.size() - 1, 0};
     placed.from = placed.to = grid(moving, at);
     placed.share = placed.step = placed.moved = 0;
@@ -78,8 +80,13 @@ void MovingBodies::place(Moving& moving, double time, double dt) {
     placed.carried.setZero();
     return;
   }
-  const auto next = std::lower_bound(poses.times.begin(), poses.times.end(), end);
-  const auto pose = static_cast<std::size_t>(next - poses.times.begin()) - 1;
+  // where it ends at a pose, it is on the way that it came
+  const auto before = [&](auto next) {
+    return static_cast<std::size_t>(next - poses.times.begin()) - 1;
+  };
+  const auto& times = poses.times;
+  const std::size_t pose = before(begin > end ? std::upper_bound(times.begin(), times.end(), end)
+                                              : std::lower_bound(times.begin(), times.end(), end));
   const int parts = parts_of(poses, pose, moving.body->grid.cell);
   const double length = (poses.times[pose + 1] - poses.times[pose]) / parts;  // s
   const double at = (end - poses.times[pose]) / length;
@@ -91,9 +98,11 @@ void MovingBodies::place(Moving& moving, double time, double dt) {
   placed.offset = middle_at(poses, pose, end);
   placed.carried = placed.offset - middle_at(poses, pose, begin);
   placed.moved = 0;
-  for (std::size_t p = pose + 1; p-- > 0 && poses.times[p + 1] > begin;) {
+  const double low = std::min(begin, end), high = std::max(begin, end);
+  const std::size_t latest = before(std::lower_bound(times.begin(), times.end(), high));
+  for (std::size_t p = latest + 1; p-- > 0 && times[p + 1] > low;) {
     const double middle = (poses.middles[p + 1] - poses.middles[p]).norm();
-    const double time_in = std::min(end, poses.times[p + 1]) - std::max(begin, poses.times[p]);
+    const double time_in = std::min(high, times[p + 1]) - std::max(low, times[p]);
     placed.moved += (middle + poses.own_ways[p]) * time_in / (poses.times[p + 1] - poses.times[p]);
   }
 }

@@ -30,8 +30,9 @@ class MovingBodies {
   MovingBodies() = default;
   explicit MovingBodies(std::span<const Collider> colliders);
 
-  // Where they are at the end of a step from `time` - dt to `time`, s.
-  void place(double time, double dt);
+  // Where they are at the end of a step from `time` - dt to `time`, s. colliders: the same, however
+  // they are led.
+  void place(std::span<const Collider> colliders, double time, double dt);
   // Of a collider as it was placed; nullptr: it is none of these, or stands in its first pose.
   const PosedBody* of(std::size_t collider) const;
   // Grids are made again when they are needed.
@@ -47,7 +48,8 @@ class MovingBodies {
     bool is_posed = false;
     std::map<At, std::shared_ptr<const PoseGrid>> grids;
   };
-  static void place(Moving& moving, double time, double dt);
+  // From one time of its poses to another, s, which may lie before it.
+  static void place(Moving& moving, double begin, double end);
   static std::shared_ptr<const PoseGrid> grid(Moving& moving, At at);
 
   std::map<std::size_t, Moving> bodies_;  // by collider

@@ -23,6 +23,8 @@ const char* name_of(Kind kind) {
       return "unpin";
     case Kind::kMoveCollider:
       return "move_collider";
+    case Kind::kPoseCollider:
+      return "pose_collider";
     case Kind::kRelax:
       return "relax";
     case Kind::kLetGo:
@@ -44,6 +46,7 @@ class ActionList {
     if (action.kind == Kind::kLetGo) return let_go(action.hand);
     if (action.kind == Kind::kRelax) return;
     if (action.kind == Kind::kMoveCollider) return move_collider(action);
+    if (action.kind == Kind::kPoseCollider) return pose_collider(action);
     const auto sheet = index_of(context_.scene.sheets, action.name, ".sheet", "sheets");
     if (!sheet) return;
     const SheetShape& shape = context_.scene.sheets[*sheet].shape;
@@ -134,6 +137,32 @@ class ActionList {
     if (!index) return;
     Path& path = constraints_.paths[*index];
     lead(action, offset_at(path, context_.time), action.target, path);
+  }
+
+  // Through its poses at one rate, from now on.
+  void pose_collider(const Action& action) {
+    const auto index = index_of(context_.scene.colliders, action.name, ".collider", "colliders");
+    if (!index) return;
+    const Collider& collider = context_.scene.colliders[*index];
+    if (!collider.poses || collider.poses->times.size() < 2)
+      return problem(".collider", join("\"", collider.name, "\" has no poses to be led through"));
+    const Poses& poses = *collider.poses;
+    const double first = poses.times.front(), last = poses.times.back(), to = action.pose_time;
+    if (!(to >= first && to <= last))
+      return problem(".pose_time_s",
+                     join(to, " s is not within its poses, ", first, " to ", last, " s"));
+    const auto& dressing = context_.scene.dressing;
+    if (dressing && dressing->deflate > 0)
+      if (const double full = dressing->close + dressing->settle; context_.time < full)
+        return problem(".collider",
+                       join("\"", collider.name, "\" has dressing.deflate_m to grow back by until ",
+                            full, " s, and is not to move before; it is ", context_.time, " s"));
+    Collider led = collider;
+    led.lead = constraints_.leads[*index];
+    const double from = std::clamp(pose_time(led, context_.time), first, last);
+    const double speed = fastest(poses, std::min(from, to), std::max(from, to));
+    const double duration = std::abs(to - from) * speed / action.pose_speed;
+    constraints_.leads[*index] = {context_.time, context_.time + duration, from, to};
   }
 
   // A straight path, from now on.

@@ -22,6 +22,7 @@ struct Action {
     kPin,           // it is held where it is, in a hand or not
     kUnpin,         // only a hand holds it, if any
     kMoveCollider,  // instead of its path, to the target
+    kPoseCollider,  // a body is led through its poses
     kLetGo,         // a hand releases all that it holds
     kRelax,         // the scene comes to rest on its shortest way, see core/motion/relaxation.h
   };
@@ -31,6 +32,8 @@ struct Action {
   Vector3d target =
       Vector3d::Zero();              // of a particle; of a collider as an offset from its start, m
   std::optional<double> duration{};  // s; absent: a frame step, or longer for kMostSpeed
+  double pose_time = 0;              // where a body is led to, among the times of its poses, s
+  double pose_speed = 1;             // of its fastest vertex on the way there, m/s
   int hand = 0;                      // 0 may drag and release what any hand holds
 };
 
@@ -47,8 +50,9 @@ struct Grip {
 
 // What holds particles and moves colliders: at first as the scene says, then as actions change it.
 struct Constraints {
-  std::vector<std::vector<Pin>> pins;  // of each sheet
-  std::vector<Path> paths;             // of each collider
+  std::vector<std::vector<Pin>> pins;          // of each sheet
+  std::vector<Path> paths;                     // of each collider
+  std::vector<std::optional<PoseLead>> leads;  // of each collider
   std::vector<Grip> grips;
 };
 

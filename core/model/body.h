@@ -37,6 +37,12 @@ std::shared_ptr<const Poses> complete(Poses poses);
 // Of the fastest vertex between two times, m/s.
 double fastest(const Poses& poses, double begin, double end);
 
+// How a hand leads a body through its poses: at one rate, and it stays where that ends.
+struct PoseLead {
+  double begin = 0, end = 0;  // s
+  double from = 0, to = 0;    // s, among the times of the poses
+};
+
 // Signed distances from a surface at the corners of cells, negative inside; between corners they
 // are trilinear. Cells lie in blocks, and each block has all of its corners, x before y before z:
 // near the surface those of its cells, deep inside the eight of the block; where the block is

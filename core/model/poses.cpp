@@ -55,6 +55,23 @@ double fastest(const Poses& poses, double begin, double end) {
   return speed;
 }
 
+double pose_time(const Collider& collider, double time) {
+  if (!collider.lead) return time;
+  const auto& [begin, end, from, to] = *collider.lead;
+  if (time >= end) return to;
+  return time <= begin ? from : from + (time - begin) / (end - begin) * (to - from);
+}
+
+double pose_speed(const Collider& collider, double begin, double end) {
+  if (!collider.poses) return 0;
+  if (!collider.lead) return fastest(*collider.poses, begin, end);
+  const PoseLead& lead = *collider.lead;
+  if (begin >= lead.end || end <= lead.begin) return 0;
+  const double from = pose_time(collider, begin), to = pose_time(collider, end);
+  return fastest(*collider.poses, std::min(from, to), std::max(from, to)) *
+         std::abs(lead.to - lead.from) / (lead.end - lead.begin);
+}
+
 std::vector<Problem> find_problems(const Poses& poses, std::size_t vertices,
                                    const std::string& field) {
   constexpr std::size_t kMostPoses = 10'000, kMostProblems = 100;

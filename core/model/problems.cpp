@@ -390,6 +390,8 @@ std::vector<Problem> find_problems(const Action& action, const std::string& fiel
   if (action.kind == Action::Kind::kDrag) check.position(field + ".target_m", action.target);
   if (action.kind == Action::Kind::kMoveCollider)
     check.position(field + ".offset_m", action.target);
+  if (action.kind == Action::Kind::kPoseCollider)
+    check.number(field + ".speed_m_per_s", action.pose_speed, 0.01, kMostSpeed, "m/s");
   if (action.duration) check.number(field + ".duration_s", *action.duration, 1e-6, 1e4, "s");
   return check.take();
 }

@@ -114,9 +114,15 @@ struct Collider {
   double friction = 0.3;
   Path path;
   std::shared_ptr<const Poses> poses{};  // of its body; none: it keeps its shape
-  std::string asset = {};        // name of what holds the mesh of its body; empty: it has none
-  std::optional<double> cell{};  // of its body's grid as asked for, m
+  std::string asset = {};          // name of what holds the mesh of its body; empty: it has none
+  std::optional<double> cell{};    // of its body's grid as asked for, m
+  std::optional<PoseLead> lead{};  // absent: its poses have the times of the scene
 };
+
+// The time among its poses at a time of the scene, s.
+double pose_time(const Collider& collider, double time);
+// Of the fastest vertex as poses lead it between two times, m/s.
+double pose_speed(const Collider& collider, double begin, double end);
 
 struct Wind {
   Vector3d velocity = Vector3d::Zero();  // m/s

@@ -45,9 +45,8 @@ double motion_speed(const Scene& scene, const SheetDefinition& sheet, double beg
     if (&each == &sheet || scene.cloth_contact)
       for (const Pin& pin : each.pins) speed = std::max(speed, path_speed(pin.path, begin, end));
   for (const Collider& collider : scene.colliders) {
-    double fast = path_speed(collider.path, begin, end);
-    if (collider.poses) fast += fastest(*collider.poses, begin, end);
-    speed = std::max(speed, fast);
+    speed =
+        std::max(speed, path_speed(collider.path, begin, end) + pose_speed(collider, begin, end));
   }
   // seams pull panels along
   constexpr double kClosing = 1;  // m/s

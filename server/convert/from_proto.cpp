@@ -623,12 +623,20 @@ Converted<Action> to_action(const v1::Action& action, const std::string& field) 
       lead(move, from.offset_m(), from);
       return move;
     }
+    case v1::Action::kPoseCollider: {
+      const auto& from = action.pose_collider();
+      Action pose{.kind = Action::Kind::kPoseCollider,
+                  .name = from.collider(),
+                  .pose_time = from.pose_time_s()};
+      if (from.has_speed_m_per_s()) pose.pose_speed = from.speed_m_per_s();
+      return pose;
+    }
     case v1::Action::kRelax:
       return Action{.kind = Action::Kind::kRelax};
     case v1::Action::ACTION_NOT_SET:
       break;
   }
-  return absent("", "grab, drag, release, pin, unpin, move_collider or relax");
+  return absent("", "grab, drag, release, pin, unpin, move_collider, pose_collider or relax");
 }
 
 Converted<LabOrder> to_lab_order(const v1::RunTestRequest& request) {

@@ -478,6 +478,11 @@ v1::Action to_proto(const Action& action) {
       to.mutable_move_collider()->set_collider(action.name);
       lead(to.mutable_move_collider()->mutable_offset_m(), to.mutable_move_collider());
       break;
+    case Action::Kind::kPoseCollider:
+      to.mutable_pose_collider()->set_collider(action.name);
+      to.mutable_pose_collider()->set_pose_time_s(action.pose_time);
+      to.mutable_pose_collider()->set_speed_m_per_s(action.pose_speed);
+      break;
     case Action::Kind::kRelax:
       to.mutable_relax();
       break;

@@ -262,6 +262,7 @@ std::vector<v1::Frame> to_proto(const Frame& frame, const FrameOrder& order) {
     stats->set_repair_count(static_cast<std::int64_t>(frame.repairs.size()));
     if (frame.cloth_cuts) stats->set_cloth_cut_count(*frame.cloth_cuts);
     if (frame.residual) stats->set_residual(*frame.residual);
+    stats->mutable_pose_times_s()->Assign(frame.pose_times.begin(), frame.pose_times.end());
   }
   return in_parts(std::move(message), order.most_bytes);
 }

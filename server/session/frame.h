@@ -49,6 +49,7 @@ struct Frame {
   std::optional<std::int64_t> cloth_cuts;  // of scenes with cloth contact
   bool at_rest = false;
   std::optional<double> residual;  // of scenes that relax, of their weight
+  std::vector<double> pose_times;  // of colliders with poses, s; empty: all at `time`
   std::int64_t substeps = 0;       // since the frame before
   double substep = 0;              // s
   std::vector<Repair> repairs;     // that it took

@@ -63,6 +63,23 @@ bool Timeline::drop_frame() {
   return true;
 }
 
+namespace {
+
+// Once one of them was led.
+std::vector<double> pose_times(const Scene& scene, double time) {
+  std::vector<double> times;
+  bool led = false;
+  for (const Collider& collider : scene.colliders) {
+    if (!collider.poses) continue;
+    const auto& own = collider.poses->times;
+    times.push_back(std::clamp(pose_time(collider, time), own.front(), own.back()));
+    led = led || collider.lead;
+  }
+  return led ? times : std::vector<double>();
+}
+
+}  // namespace
+
 std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs, bool read) const {
   auto frame = std::make_shared<Frame>();
   const std::size_t values = 3 * static_cast<std::size_t>(simulation.particle_count());
@@ -77,6 +94,7 @@ std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs, b
   if (read) frame->deformation = simulation.deformation();
   frame->at_rest = simulation.at_rest();
   frame->residual = simulation.residual();
+  frame->pose_times = pose_times(simulation.scene(), frame->time);
   frame->substeps = simulation.substeps();
   frame->substep = simulation.plan().step.substep;
   frame->repairs = std::move(repairs);

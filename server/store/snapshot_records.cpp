@@ -107,6 +107,16 @@ Relaxation relaxation_of(const stored::KeptRelaxation& from) {
           .settling = from.settling()};
 }
 
+void set(stored::KeptPath* to, const Path& path, const std::optional<PoseLead>& lead) {
+  *to->mutable_path() = to_proto(path);
+  if (!lead) return;
+  stored::KeptPoseLead* kept = to->mutable_lead();
+  kept->set_begin_s(lead->begin);
+  kept->set_end_s(lead->end);
+  kept->set_from_s(lead->from);
+  kept->set_to_s(lead->to);
+}
+
 // Plans that a snapshot shares, each once.
 class Plans {
  public:
@@ -173,7 +183,8 @@ std::string encode(const std::string& uid, const SessionSnapshot& snapshot) {
   const Constraints& constraints = simulation.constraints;
   for (std::size_t s = 0; s < simulation.sheets.size(); ++s)
     set(to.add_sheets(), simulation.sheets[s], constraints.pins[s]);
-  for (const Path& path : constraints.paths) *to.add_paths()->mutable_path() = to_proto(path);
+  for (std::size_t c = 0; c < constraints.paths.size(); ++c)
+    set(to.add_paths(), constraints.paths[c], constraints.leads[c]);
   for (const Grip& grip : constraints.grips) {
     stored::KeptGrab* kept = to.add_grabs();
     kept->set_sheet(static_cast<int>(grip.sheet));
@@ -228,8 +239,12 @@ SessionSnapshot decode_snapshot(const std::string& uid, const std::string& bytes
     auto& pins = simulation.constraints.pins.emplace_back();
     for (const auto& pin : each.pins()) pins.push_back(to_pin(pin));
   }
-  for (const auto& each : from.paths())
+  for (const auto& each : from.paths()) {
     simulation.constraints.paths.push_back(to_path(each.path()));
+    auto& lead = simulation.constraints.leads.emplace_back();
+    if (const auto& kept = each.lead(); each.has_lead())
+      lead = {kept.begin_s(), kept.end_s(), kept.from_s(), kept.to_s()};
+  }
   for (const auto& each : from.grabs()) {
     simulation.constraints.grips.push_back(
         {static_cast<std::size_t>(each.sheet()), each.particle(), each.hand(), each.pinned()});

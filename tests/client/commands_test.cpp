@@ -9,6 +9,7 @@
 #include "client/weft.h"
 #include "server/config.h"
 #include "tests/client/client_test.h"
+#include "tests/support/service/assets.h"
 
 namespace weft::testing {
 namespace {
@@ -139,6 +140,26 @@ TEST_F(CommandsTest, ACornerIsGrabbedDraggedAndReleased) {
               HasSubstr("particle 20 is not on a sheet of 20 particles"));
   EXPECT_THAT(weft({"act", "move", "cloth", "--to", "0,1,0"}).err,
               HasSubstr("the scene has no collider"));
+}
+
+TEST_F(CommandsTest, ABodyIsLedThroughItsPosesAtASpeed) {
+  ask({"session", "create", scene_file(posed_scene()), "--id", "lid"});
+  EXPECT_EQ(weft({"act", "pose", "lid", "--to", "10.5", "--speed", "2"}).out,
+            "applied from frame 1\n");
+  // 0.1 m at 2 m/s, in frames of 1/60 s
+  ask({"step", "lid", "--frames", "2"});
+  const auto pose_time = [&](std::int64_t frame) {
+    return stream("sessions/lid", frame, frame)[0].stats().pose_times_s(0);
+  };
+  EXPECT_NEAR(pose_time(2), 10 + 2 * 2 / 60.0 / 0.2, 1e-6);
+  ask({"step", "lid", "--frames", "10"});
+  EXPECT_EQ(pose_time(12), 10.5);
+  EXPECT_THAT(weft({"act", "pose", "lid", "--to", "12"}).err,
+              HasSubstr("pose_time_s: 12 s is not within its poses, 10 to 11 s"));
+  EXPECT_THAT(weft({"act", "pose", "lid", "--to", "11", "--speed", "21"}).err,
+              HasSubstr("speed_m_per_s: 21 m/s is not within 0.01 to 20 m/s"));
+  EXPECT_THAT(weft({"act", "pose", "lid", "moon", "--to", "11"}).err,
+              HasSubstr("there is no collider \"moon\""));
 }
 
 TEST_F(CommandsTest, AStepAboveTheBoundIsRefusedWithBoth) {

@@ -120,6 +120,26 @@ steps:
       AllOf(HasSubstr("column is missing"), HasSubstr("drag.to_m")));
 }
 
+TEST_F(ScriptTest, LeadsABodyThroughItsPoses) {
+  scene_file(posed_scene());
+  EXPECT_EQ(ask({"script", script(R"(
+steps:
+  - create: {scene: scene.json}
+  - record: {file: led.weft}
+  - pose: {to_s: 10.5, speed_m_per_s: 2}
+  - run: {until_frame: 12}
+)")})["failed"],
+            0);
+  const auto times = client::RecordingReader(path("led.weft")).read(12).stats().pose_times_s();
+  ASSERT_THAT(times, SizeIs(1));
+  EXPECT_EQ(times[0], 10.5);
+  EXPECT_THAT(refusal(R"(steps:
+  - create: {scene: scene.json}
+  - pose: {speed_m_per_s: 21}
+)"),
+              AllOf(HasSubstr("to_s is missing"), HasSubstr("speed_m_per_s")));
+}
+
 // Only what has relaxed stands still to the last bit.
 TEST_F(ScriptTest, RelaxesAsTheCommandsDo) {
   const auto result = ask({"script", script(R"(

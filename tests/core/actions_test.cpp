@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/simulation.h"
+#include "tests/support/core/bodies.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::testing {
@@ -209,6 +210,107 @@ TEST(Actions, SaysWhatIsWrongWithActions) {
   stream.hand = 1;
   EXPECT_EQ(problem(stream), "actions[1].release.particle: 9 is grabbed by another stream or call");
   EXPECT_EQ(problem(drag(9, Vector3d(x.col(9)) + Vector3d(3, 0, 0))), "");
+}
+
+// A patch on a box whose upper side rises by 0.2 m within a second, from 10 s on.
+Scene lid() {
+  SheetDefinition sheet = flat_sheet(7, 7, 0.02);
+  sheet.origin = {-0.06, 0.0511, -0.06};
+  sheet.skin = 1e-3;
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.colliders = {
+      posed(box_mesh({0.2, 0.05, 0.2}), {10, 11, 12}, [](const Vector3d& vertex, double time) {
+        return Vector3d(vertex + Vector3d(0, vertex.y() > 0 ? 0.2 * (time - 10) : 0, 0));
+      })};
+  return scene;
+}
+
+Action pose(double time, double speed) {
+  return {.kind = Kind::kPoseCollider, .pose_time = time, .pose_speed = speed};
+}
+
+TEST(Actions, LeadABodyThroughItsPosesAtASpeedThereAndBackAndItStays) {
+  Simulation simulation(lid());
+  advance(simulation, 30);
+  const double start = positions(simulation).row(1).mean();
+  EXPECT_NEAR(start, 0.051, 1e-3) << "long before its poses it stands in the first";
+  double height = 0.1;  // of the upper side, m
+  const auto lead = [&](double to, double speed) {
+    expect_done(simulation, {pose(10 + to / 0.2, speed)});
+    const double from = height - 0.1, begin = simulation.time();
+    const double needed = std::abs(to - from) / speed;
+    while (simulation.time() < begin + needed + 0.5) {
+      advance(simulation, 1);
+      const double share = std::min(1.0, (simulation.time() - begin) / needed);
+      height = 0.1 + from + share * (to - from);
+      const Matrix3Xd x = positions(simulation);
+      EXPECT_GE(x.row(1).minCoeff(), height - 0.05 + 0.5e-3) << simulation.time();
+      if (to > from) {
+        EXPECT_LE(x.row(1).maxCoeff(), height - 0.05 + 0.02) << simulation.time();
+      }
+    }
+    EXPECT_NEAR(positions(simulation).row(1).mean(), start + to, 1e-3);
+  };
+  lead(0.3, 0.4);
+  lead(0.1, 0.2);
+  lead(0, 1);
+  lead(0.4, 0.1);
+}
+
+TEST(Actions, ALedBodyGoesOnFromASnapshotToTheBit) {
+  Simulation simulation(lid());
+  advance(simulation, 10);
+  expect_done(simulation, {pose(11.5, 0.5)});
+  advance(simulation, 10);
+  const Snapshot snapshot = simulation.snapshot();
+  Simulation other(lid());
+  ASSERT_TRUE(other.restore(snapshot));
+  advance(simulation, 30);
+  advance(other, 30);
+  EXPECT_EQ(positions(simulation), positions(other));
+  EXPECT_NEAR(positions(other).row(1).mean(), 0.051 + 0.2, 1e-3);
+  Snapshot beyond = snapshot;
+  beyond.constraints.leads[0]->to = 13;
+  EXPECT_FALSE(other.restore(beyond));
+}
+
+TEST(Actions, ClearanceIsFromABodyWhereItIsLed) {
+  Simulation simulation(lid());
+  expect_done(simulation, {pose(12, 20)});
+  advance(simulation, 5);
+  FrameMeter meter(simulation.scene());
+  const std::vector<double> above{0, 0.6, 0};
+  const auto found = meter.clearances(simulation.scene_of_frame(), above, simulation.time());
+  EXPECT_NEAR(found[0], 0.6 - 0.45, 1e-6);
+}
+
+TEST(Actions, SayWhatIsWrongWithPoses) {
+  Scene scene = lid();
+  scene.colliders.push_back({"ball", Sphere{Vector3d(5, 0, 0), 0.1}, 0.3, {}});
+  const auto problem = [&](const Action& action) {
+    const auto problems = Simulation(scene).problems_of({action});
+    return problems.empty() ? "" : problems[0].field + ": " + problems[0].message;
+  };
+  Action led = pose(13, 1);
+  led.name = "body";
+  EXPECT_EQ(problem(led),
+            "actions[0].pose_collider.pose_time_s: 13 s is not within its poses, 10 to 12 s");
+  led.pose_time = std::nan("");
+  EXPECT_EQ(problem(led),
+            "actions[0].pose_collider.pose_time_s: nan s is not within its poses, 10 to 12 s");
+  led.pose_time = 11;
+  led.pose_speed = 21;
+  EXPECT_EQ(problem(led),
+            "actions[0].pose_collider.speed_m_per_s: 21 m/s is not within 0.01 to 20 m/s");
+  led.pose_speed = 1;
+  EXPECT_EQ(problem(led), "");
+  led.name = "ball";
+  EXPECT_EQ(problem(led),
+            "actions[0].pose_collider.collider: \"ball\" has no poses to be led through");
+  led.name = "";
+  EXPECT_EQ(problem(led),
+            "actions[0].pose_collider.collider: \"\" is none of the colliders: body, ball");
 }
 
 }  // namespace

@@ -222,6 +222,57 @@ test('a garment takes another fabric, and is led from its pattern or by the clot
   await close();
 });
 
+// A box whose upper side rises by 0.3 m from its first pose to its second.
+function lid() {
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => [k & 4 ? 0.2 : -0.2, k & 2 ? 0.05 : -0.05, k & 1 ? 0.2 : -0.2]);
+  const triangles = [0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3];
+  const risen = corners.map(([x, y, z]) => [x, y > 0 ? y + 0.3 : y, z]);
+  const planes = (points) => [0, 1, 2].flatMap((axis) => points.map((point) => point[axis]));
+  const base64 = (array) => Buffer.from(array.buffer).toString('base64');
+  return {name: 'lid', mesh: {data: {triangles: base64(Uint32Array.from(triangles)),
+    poses: {times_s: [10, 11], positions_m: base64(Float32Array.from([...planes(corners), ...planes(risen)]))}}}};
+}
+
+test('a slider leads a body through its poses, and it is drawn where it is', async () => {
+  writeFileSync(file('lid.json'), JSON.stringify({...sewn(true), colliders: [lid()]}));
+  weft('session', 'create', file('lid.json'), '--id', 'lid');
+  const {page, close} = await open('lid');
+  assert.equal(await page.locator('#posed').isVisible(), true);
+  await says(page, 'poses', /lid10\.00 s/);
+  await page.getByLabel('Pose of lid').fill('10.5');
+  await says(page, 'doing', /Leads lid from frame 1 on, when it runs/);
+  await play(page);
+  await says(page, 'poses', /lid10\.50 s/);
+  await pause(page);
+  await settle(page);
+  await picture(page, 'serve-poses');
+  await page.getByLabel('Pose of lid').fill('10.9');
+  weft('act', 'pose', 'lid', '--to', '10.2');
+  await play(page);
+  await says(page, 'poses', /lid10\.20 s/);
+  await pause(page);
+  assert.ok(Math.abs(Number(await page.getByLabel('Pose of lid').inputValue()) - 10.2) < 0.01, 'another led it');
+  await page.setViewportSize({width: 390, height: 844});
+  await page.locator('#posed').scrollIntoViewIfNeeded();
+  await settle(page);
+  await picture(page, 'serve-poses-phone');
+  await page.setViewportSize({width: 1280, height: 800});
+  const drawn = await canvas(page);
+  await page.getByRole('button', {name: 'Pattern'}).click();
+  await settle(page);
+  await picture(page, 'serve-folds');
+  await page.getByRole('button', {name: 'Pattern'}).click();
+  await settle(page);
+  assert.equal(await canvas(page), drawn);
+  await close();
+});
+
+test('a body without poses has no slider', async () => {
+  const {page, close} = await open('ball');
+  assert.equal(await page.locator('#posed').isVisible(), false);
+  await close();
+});
+
 test('sliders and typed numbers change the textile while it runs', async () => {
   const {page, close} = await open('ball');
   await page.locator('#speed').selectOption('1');

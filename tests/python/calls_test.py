@@ -163,6 +163,20 @@ class Plain(unittest.TestCase):
         session = self.server.create_session(weft.Scene(FALL.sheets, [ball]))
         self.assertEqual(session.move_collider((0, 0.5, 0), over=0.1, collider="ball"), 1)
 
+    def test_bodies_are_led_through_their_poses(self):
+        corners, faces = octahedron(0.2)
+        poses = weft.Poses([0, 1], [corners, corners + [0, 0.5, 0]])
+        body = weft.Collider.mesh(corners, faces, poses=poses, name="body")
+        session = self.server.create_session(weft.Scene(FALL.sheets, [body]))
+        self.assertEqual(session.pose_collider(0.5, speed=2, collider="body"), 1)
+        session.step(20)
+        self.assertEqual(list(session.frame().stats.pose_times_s), [0.5])
+        with self.assertRaises(weft.InvalidArgument) as refused:
+            session.pose_collider(2)
+        self.assertEqual(
+            refused.exception.violations[0].field, "actions[0].pose_collider.pose_time_s"
+        )
+
     def test_a_session_relaxes_to_the_rest_of_its_scene(self):
         session = self.server.create_session(hung())
         self.assertEqual(session.relax(), 1)

@@ -5,6 +5,7 @@
 
 #include "server/store/store.h"
 #include "tests/server/restart_support.h"
+#include "tests/support/service/assets.h"
 
 namespace weft::testing {
 namespace {
@@ -148,6 +149,38 @@ TEST_F(Restart, RepeatsActionsAndLetsGoOfWhatStreamsHeld) {
   const auto after = frames(session, 15);
   restart();
   expect_equal(frames(session, 15), after);
+}
+
+TEST_F(Restart, GoesOnWithABodyThatIsLed) {
+  for (const int snapshot_ms : {3'600'000, 0}) {
+    snapshot_ms_ = snapshot_ms;
+    restart();
+    const v1::Session session = service_->create(posed_scene());
+    const v1::Session other = service_->create(posed_scene());
+    v1::ApplyActionsRequest request;
+    request.add_actions()->mutable_pose_collider()->set_pose_time_s(10.9);
+    for (const v1::Session& each : {session, other}) {
+      request.set_name(each.name());
+      ASSERT_EQ(service_->error(&Sessions::ApplyActions, request).code, grpc::StatusCode::OK);
+    }
+    const auto pose_times = [&](const v1::Session& of) {
+      v1::StreamFramesRequest late = frames_of(of, 7, 20);
+      late.mutable_format()->set_stats(true);
+      std::vector<double> times;
+      for (const v1::Frame& frame : Stream(*service_, late).rest())
+        for (const double time : frame.stats().pose_times_s()) times.push_back(time);
+      return times;
+    };
+    service_->step(other, 20);
+    const auto wanted = pose_times(other);
+    ASSERT_THAT(wanted, SizeIs(14));
+    EXPECT_NEAR(wanted.front(), 10 + 7 / 60.0 / 0.2, 1e-6) << "at 1 m/s";
+    EXPECT_EQ(wanted.back(), 10.9);
+    service_->step(session, 6);
+    restart();
+    service_->step(session, 14);
+    EXPECT_EQ(pose_times(session), wanted);
+  }
 }
 
 TEST_F(Restart, ShowsSessionsAsTheyWere) {

@@ -39,6 +39,7 @@ from .scene import (
     PinParticle,
     Placement,
     Plane,
+    PoseCollider,
     Poses,
     RawTextile,
     Relax,
@@ -59,7 +60,7 @@ __all__ = [
     "Hand", "Hold", "InvalidArgument", "Isometric", "Keyframe", "MeasuredTextile", "MeshData",
     "MoveCollider", "NoConnection", "NotFound", "Panel", "Pattern", "PatternCrease",
     "PatternEdge", "PatternPanel", "PatternSeam", "Pin", "PinParticle", "Placement", "Plane",
-    "Poses", "RawTextile", "Recording", "Relax", "Release", "Scene", "Server", "Session",
-    "Sheet", "SolverSettings", "Sphere", "Textile", "TriangleSheet", "UnpinParticle",
+    "PoseCollider", "Poses", "RawTextile", "Recording", "Relax", "Release", "Scene", "Server",
+    "Session", "Sheet", "SolverSettings", "Sphere", "Textile", "TriangleSheet", "UnpinParticle",
     "Violation", "Wind", "aio", "connect", "errors", "open", "serve", "v1",
 ]

@@ -33,6 +33,7 @@ from .scene import (
     MoveCollider,
     Pattern,
     PinParticle,
+    PoseCollider,
     Relax,
     Release,
     Scene,
@@ -473,6 +474,11 @@ class Session:
         self, offset_m: Vector3, over: float | None = None, collider: str = ""
     ) -> int:
         return await self.act(MoveCollider(offset_m, over, collider))
+
+    async def pose_collider(
+        self, pose_time_s: float, speed: float | None = None, collider: str = ""
+    ) -> int:
+        return await self.act(PoseCollider(pose_time_s, speed, collider))
 
     async def relax(self) -> int:
         return await self.act(Relax())

@@ -26,6 +26,7 @@ from .scene import (
     MoveCollider,
     Pattern,
     PinParticle,
+    PoseCollider,
     Relax,
     Release,
     Scene,
@@ -580,6 +581,12 @@ class Session:
     ) -> int:
         """Moves a collider to an offset from its start, m, within `over` simulated s."""
         return self.act(MoveCollider(offset_m, over, collider))
+
+    def pose_collider(
+        self, pose_time_s: float, speed: float | None = None, collider: str = ""
+    ) -> int:
+        """Leads a body through its poses to a time of these, at a speed, m/s, 1 if None."""
+        return self.act(PoseCollider(pose_time_s, speed, collider))
 
     def relax(self) -> int:
         """Comes to rest on the shortest way instead of moving in time; run(until_rest=True) it."""

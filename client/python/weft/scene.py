@@ -680,13 +680,25 @@ class MoveCollider(Value):
 
 
 @dataclass(eq=False)
+class PoseCollider(Value):
+    """A body is led through its poses to a time of these, s; its fastest vertex at a speed, m/s."""
+
+    message = action_pb2.PoseCollider
+    pose_time_s: float
+    speed_m_per_s: float | None = None
+    collider: str = ""
+
+
+@dataclass(eq=False)
 class Relax(Value):
     """The scene comes to rest on its shortest way, instead of moving in time."""
 
     message = action_pb2.Relax
 
 
-Action = Union[Grab, Drag, Release, PinParticle, UnpinParticle, MoveCollider, Relax]
+Action = Union[
+    Grab, Drag, Release, PinParticle, UnpinParticle, MoveCollider, PoseCollider, Relax
+]
 
 
 @dataclass(eq=False)

@@ -189,7 +189,7 @@ template <class T>
 void expect_rows_like_particles(const std::vector<Collider>& colliders) {
   const double tolerance = sizeof(T) == sizeof(float) ? 0x1p-46 : 0x1p-48;
   MovingBodies bodies(colliders);
-  bodies.place(0.7, 0.1);
+  bodies.place(colliders, 0.7, 0.1);
   const Contacts contacts(colliders, bodies, 0.4, 1e-3, 0.7, 0.1);
   Rows<T> rows, before;
   int touched = 0, i = 0;

@@ -37,7 +37,7 @@ Errors errors_of(const Collider& body, double time, const F& distance_at) {
   const double cell = std::get<SharedBody>(body.shape)->grid.cell;
   const std::vector<Collider> colliders{body};
   MovingBodies bodies(colliders);
-  bodies.place(time, 1e-4);
+  bodies.place(colliders, time, 1e-4);
   const BodyMesh mesh = mesh_at(body, time);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -105,7 +105,7 @@ TEST(Poses, SayNoMoreThanTheWayToTheBodyAndWhichSideAPointIsOn) {
   const std::vector<Collider> colliders{body};
   MovingBodies bodies(colliders);
   for (const double time : {0.1, 0.23}) {
-    bodies.place(time, 1e-4);
+    bodies.place(colliders, time, 1e-4);
     const BodyMesh mesh = mesh_at(body, time);
     std::mt19937 random(7);
     std::uniform_real_distribution<double> uniform(-0.3, 0.3);
@@ -189,7 +189,7 @@ TEST(Poses, NeverPassThroughASheet) {
   while (simulation.time() < 0.5) {
     ASSERT_TRUE(simulation.advance_frame());
     MovingBodies bodies(scene.colliders);
-    bodies.place(simulation.time(), 1e-4);
+    bodies.place(scene.colliders, simulation.time(), 1e-4);
     const Matrix3Xd x = positions(simulation);
     for (Eigen::Index i = 0; i < x.cols(); ++i)
       ASSERT_GT(distance(scene.colliders[0], x.col(i), simulation.time(), bodies.of(0)).value,

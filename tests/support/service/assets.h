@@ -20,6 +20,8 @@ v1::MeshData cube_mesh(float half, float x, float y, float z);
 // A sheet of the mesh, held by its first particle. By itself, or by the name of an asset.
 v1::Scene scene_of(const v1::MeshData& mesh);
 v1::Scene scene_of(const std::string& asset);
+// small_scene() far above a cube, which moves by 0.2 m/s from its pose at 10 s to that at 11 s.
+v1::Scene posed_scene();
 
 // "assets/{hash}".
 std::string name_of_asset(const std::string& bytes);

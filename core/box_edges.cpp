@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kUnmet = std::numeric_limits<double>::infinity();
 constexpr double kToldMotion = 1.001;  // of what solvers say, which is rounded
-constexpr double kLookedAt = 1e-6;       // what is so near is looked at in every step, m
+constexpr double kLookedAt = 1e-6;     // what is so near is looked at in every step, m
 // A point that follows free particles by less would throw them far.
 constexpr double kLeastFollowing = 0.1;
 
@@ -35,8 +35,7 @@ void BoxEdges::forget() {
   due_ = come_ = 0;
 }
 
-double BoxEdges::keep_out(const Contacts& contacts, double dt, double pressed,
-                          MovingSheet& sheet) {
+double BoxEdges::keep_out(const Contacts& contacts, double dt, double pressed, MovingSheet& sheet) {
   // corners of a box that grows come faster than its faces, by less than twice
   come_ += kToldMotion * (sheet.solver->moved() + sheet.solver->pushed()) + pressed +
            2 * contacts.reach();
@@ -52,17 +51,19 @@ double BoxEdges::keep_out(const Contacts& contacts, double dt, double pressed,
   if (touches_.empty()) return 0;
 
   separate(Contacts::kOutward * dt + pressed);
-  Eigen::Index moved = 0;
+  moved_.clear();
   for (Eigen::Index k = 0; k < by_.cols(); ++k) {
     if (by_.col(k).isZero(0) && in_step_.col(k).isZero(0)) continue;
-    particles_[static_cast<std::size_t>(moved)] = particles_[static_cast<std::size_t>(k)];
-    by_.col(moved) = by_.col(k);
-    in_step_.col(moved++) = in_step_.col(k);
+    const auto n = static_cast<Eigen::Index>(moved_.size());
+    moved_.push_back(particles_[static_cast<std::size_t>(k)]);
+    by_.col(n) = by_.col(k);
+    in_step_.col(n) = in_step_.col(k);
   }
-  if (moved == 0) return 0;
-  sheet.solver->displace(std::span(particles_).first(static_cast<std::size_t>(moved)),
-                         by_.leftCols(moved), in_step_.leftCols(moved));
-  const double farthest = kToldMotion * std::sqrt(by_.leftCols(moved).colwise().squaredNorm().maxCoeff());
+  if (moved_.empty()) return 0;
+  const auto moved = static_cast<Eigen::Index>(moved_.size());
+  sheet.solver->displace(moved_, by_.leftCols(moved), in_step_.leftCols(moved));
+  const double farthest =
+      kToldMotion * std::sqrt(by_.leftCols(moved).colwise().squaredNorm().maxCoeff());
   come_ += farthest;
   return farthest;
 }
@@ -118,8 +119,8 @@ void BoxEdges::meet_edge(const Contacts::Placed& placed, const Vector3d& half, d
                          Part& edge) {
   const Vector3d from = local_.col(edge.corners[0]), to = local_.col(edge.corners[1]);
   // whatever it cuts off an edge of the box, that edge is as near to its middle as its ends are
-  const double gap = distance_from_frame((from + to) / 2, half, false) - (to - from).norm() / 2 -
-                     skin - kLookedAt;
+  const double gap =
+      distance_from_frame((from + to) / 2, half, false) - (to - from).norm() / 2 - skin - kLookedAt;
   edge.gap = std::min(edge.gap, gap);
   if (gap > 0) return;
   for (Eigen::Index k = 0; k < 3; ++k) {
@@ -231,8 +232,7 @@ void BoxEdges::separate(double creep) {
   for (int round = 0; round < kRounds; ++round) {
     double most = 0;
     for (Touch& touch : touches_) {
-      const double push =
-          std::max(touch.depth - of(touch, by_).dot(touch.normal), -touch.pushed);
+      const double push = std::max(touch.depth - of(touch, by_).dot(touch.normal), -touch.pushed);
       touch.pushed += push;
       give(touch, push * touch.normal, by_);
 
@@ -250,8 +250,7 @@ void BoxEdges::separate(double creep) {
     const Vector3d sliding = relative - relative.dot(touch.normal) * touch.normal;
     const double length = sliding.norm();
     if (length == 0) continue;
-    const Vector3d stopped =
-        -std::min(1.0, touch.friction * touch.stopped / length) * sliding;
+    const Vector3d stopped = -std::min(1.0, touch.friction * touch.stopped / length) * sliding;
     give(touch, stopped, by_);
     give(touch, stopped, in_step_);
   }

@@ -62,7 +62,7 @@ class BoxEdges {
   double due_ = 0, come_ = 0;
 
   // those that are looked at, and their particles
-  std::vector<int> blocks_, particles_, column_;
+  std::vector<int> blocks_, particles_, column_, moved_;
   std::vector<Part> edges_, triangles_;
   Matrix3Xd x_, d_, local_, by_, in_step_;  // m
   std::vector<double> inverse_mass_;        // 1/kg

@@ -27,7 +27,24 @@ void Untangling::find(NearBlocks& near, const Matrix3Xd& x, double speed) {
     for (const int i : cloth_.triangles[t])
       around[static_cast<std::size_t>(i)].push_back(static_cast<int>(t));
   at_cut_.resize(around.size());
+  // A crease that stays folded through itself is held so by the cloth beside it, which is on the
+  // wrong side too. Where more has passed through, that keeps it from passing farther.
+  constexpr double kSlow = 5;  // m/s
+  constexpr std::size_t kFew = 8;
+  frees_beside_ = speed > kSlow && cuts.size() <= kFew;
   for (const auto& [edge, triangle] : cuts) add(edge, triangle, around, x, speed);
+}
+
+// Whether a triangle has corners of both.
+bool Untangling::joined(const std::array<int, 2>& edge, const std::array<int, 3>& triangle,
+                        const Around& around) const {
+  const auto has_corner = [&](int t) {
+    const auto& own = cloth_.triangles[static_cast<std::size_t>(t)];
+    return std::ranges::find_first_of(own, triangle) != own.end();
+  };
+  return std::ranges::any_of(edge, [&](int end) {
+    return std::ranges::any_of(around[static_cast<std::size_t>(end)], has_corner);
+  });
 }
 
 bool Untangling::has(const std::array<int, 4>& particles) const {
@@ -65,6 +82,11 @@ void Untangling::add(int edge, int triangle, const Around& around, const Matrix3
   const Vector3d way = line - along.dot(line) / rise * normal;
   const double turn = way.norm();
   if (turn == 0) return;
+
+  if (frees_beside_ && joined({p, q}, corners, around))
+    for (const int i : {p, q, a, b, c})
+      for (const int t : around[static_cast<std::size_t>(i)])
+        std::ranges::for_each(cloth_.triangles[static_cast<std::size_t>(t)], at_cut);
 
   const double share = std::clamp((x.col(a) - x.col(p)).dot(normal) / rise, 0.0, 1.0);
   const Vector3d at = x.col(p) + share * along - x.col(a);

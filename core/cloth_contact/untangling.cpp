@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
 #include "core/cloth_contact/cuts.h"
 
@@ -31,20 +32,27 @@ void Untangling::find(NearBlocks& near, const Matrix3Xd& x, double speed) {
   // wrong side too. Where more has passed through, that keeps it from passing farther.
   constexpr double kSlow = 5;  // m/s
   constexpr std::size_t kFew = 8;
-  frees_beside_ = speed > kSlow && cuts.size() <= kFew;
-  for (const auto& [edge, triangle] : cuts) add(edge, triangle, around, x, speed);
+  const bool frees_beside = speed > kSlow && cuts.size() <= kFew;
+  for (const auto& [edge, triangle] : cuts) {
+    add(edge, triangle, around, x, speed);
+    if (frees_beside) free_beside(edge, triangle, around);
+  }
 }
 
-// Whether a triangle has corners of both.
-bool Untangling::joined(const std::array<int, 2>& edge, const std::array<int, 3>& triangle,
-                        const Around& around) const {
-  const auto has_corner = [&](int t) {
-    const auto& own = cloth_.triangles[static_cast<std::size_t>(t)];
-    return std::ranges::find_first_of(own, triangle) != own.end();
+// Of an edge and a triangle that are joined by another triangle what lies around them is at the
+// cut.
+void Untangling::free_beside(int edge, int triangle, const Around& around) {
+  const auto& [p, q] = cloth_.edges[static_cast<std::size_t>(edge)];
+  const auto& [a, b, c] = cloth_.triangles[static_cast<std::size_t>(triangle)];
+  const auto around_any = [&](std::initializer_list<int> particles, const auto& see) {
+    for (const int i : particles)
+      for (const int t : around[static_cast<std::size_t>(i)])
+        for (const int corner : cloth_.triangles[static_cast<std::size_t>(t)]) see(corner);
   };
-  return std::ranges::any_of(edge, [&](int end) {
-    return std::ranges::any_of(around[static_cast<std::size_t>(end)], has_corner);
-  });
+  bool joined = false;
+  around_any({p, q}, [&](int i) { joined = joined || i == a || i == b || i == c; });
+  if (!joined) return;
+  around_any({p, q, a, b, c}, [&](int i) { at_cut_[static_cast<std::size_t>(i)] = true; });
 }
 
 bool Untangling::has(const std::array<int, 4>& particles) const {
@@ -82,11 +90,6 @@ void Untangling::add(int edge, int triangle, const Around& around, const Matrix3
   const Vector3d way = line - along.dot(line) / rise * normal;
   const double turn = way.norm();
   if (turn == 0) return;
-
-  if (frees_beside_ && joined({p, q}, corners, around))
-    for (const int i : {p, q, a, b, c})
-      for (const int t : around[static_cast<std::size_t>(i)])
-        std::ranges::for_each(cloth_.triangles[static_cast<std::size_t>(t)], at_cut);
 
   const double share = std::clamp((x.col(a) - x.col(p)).dot(normal) / rise, 0.0, 1.0);
   const Vector3d at = x.col(p) + share * along - x.col(a);

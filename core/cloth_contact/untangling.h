@@ -43,13 +43,11 @@ class Untangling {
 
   using Around = std::vector<std::vector<int>>;  // triangles of each particle
   void add(int edge, int triangle, const Around& around, const Matrix3Xd& x, double speed);
-  bool joined(const std::array<int, 2>& edge, const std::array<int, 3>& triangle,
-              const Around& around) const;
+  void free_beside(int edge, int triangle, const Around& around);
 
   const Cloth& cloth_;
   std::vector<Pair> pairs_;
-  std::vector<bool> at_cut_;   // of each particle; or empty
-  bool frees_beside_ = false;  // particles beside a cut are at it too
+  std::vector<bool> at_cut_;  // of each particle; or empty
 };
 
 }  // namespace weft

@@ -43,16 +43,18 @@ void Untangling::find(NearBlocks& near, const Matrix3Xd& x, double speed) {
 // cut.
 void Untangling::free_beside(int edge, int triangle, const Around& around) {
   const auto& [p, q] = cloth_.edges[static_cast<std::size_t>(edge)];
-  const auto& [a, b, c] = cloth_.triangles[static_cast<std::size_t>(triangle)];
+  const std::array<int, 3> corners = cloth_.triangles[static_cast<std::size_t>(triangle)];
   const auto around_any = [&](std::initializer_list<int> particles, const auto& see) {
     for (const int i : particles)
       for (const int t : around[static_cast<std::size_t>(i)])
         for (const int corner : cloth_.triangles[static_cast<std::size_t>(t)]) see(corner);
   };
   bool joined = false;
-  around_any({p, q}, [&](int i) { joined = joined || i == a || i == b || i == c; });
+  around_any({p, q},
+             [&](int i) { joined = joined || std::ranges::find(corners, i) != corners.end(); });
   if (!joined) return;
-  around_any({p, q, a, b, c}, [&](int i) { at_cut_[static_cast<std::size_t>(i)] = true; });
+  around_any({p, q, corners[0], corners[1], corners[2]},
+             [&](int i) { at_cut_[static_cast<std::size_t>(i)] = true; });
 }
 
 bool Untangling::has(const std::array<int, 4>& particles) const {

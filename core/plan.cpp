@@ -436,13 +436,13 @@ void warn(const Scene& scene, const std::vector<PlannedSheet>& planned,
     plan.warnings.push_back(
         {"NO_SHEET_SHEET_COLLISION", "sheets", "sheets may pass through each other"});
   for (std::size_t c = 0; c < scene.colliders.size(); ++c)
-    if (std::holds_alternative<Box>(scene.colliders[c].shape))
+    if (std::holds_alternative<Box>(scene.colliders[c].shape) && !scene.cloth_contact)
       plan.warnings.push_back(
           {"BOX_EDGES", "colliders[" + std::to_string(c) + "].box",
-           "only particles are kept out: an edge of the box may cut through the "
-           "cells between them, and cells that are pulled over an edge may stay hooked on it, "
-           "stretched by half for good. A finer grid, a larger skin_m or a capsule along the "
-           "edge helps"});
+           "without cloth_contact only particles are kept out: an edge of the box may cut through "
+           "the cells between them, and cells that are pulled over an edge may stay hooked on it, "
+           "stretched by half for good. A finer grid, a larger skin_m or a capsule along the edge "
+           "helps"});
   for (std::size_t c = 0; c < scene.colliders.size(); ++c)
     if (const auto* body = std::get_if<SharedBody>(&scene.colliders[c].shape))
       warn_of_body(c, **body, plan);

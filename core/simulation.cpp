@@ -95,8 +95,12 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
   // colliders last, so that no particle ends a step inside one
   if (scene.colliders.empty()) return;
   const double pressed = cloth_contact ? cloth_contact->moved() : 0;
-  for (std::size_t s = 0; s < sheets.size(); ++s)
-    sheets[s].solver->resolve(contacts_of(s, time, dt, pressed), pool);
+  for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const Contacts contacts = contacts_of(s, time, dt, pressed);
+    if (!box_edges.empty())
+      cloth_contact->follow(box_edges[s].keep_out(contacts, dt, pressed, sheets[s]));
+    sheets[s].solver->resolve(contacts, pool);
+  }
 }
 
 // In the substep from `time` to `time` + dt; bodies are placed. pressed: contact.h.
@@ -188,6 +192,7 @@ void Simulation::State::restart_from(NextStates& next) {
 void Simulation::State::forget_motion() {
   if (!cloth_contact) return;
   cloth_contact->forget();
+  for (BoxEdges& edges : box_edges) edges.forget();
   for (MovingSheet& sheet : sheets) sheet.solver->measure();
 }
 
@@ -286,11 +291,17 @@ Simulation::State::State(Scene given, SolverFactory factory)
 void Simulation::State::make_cloth_contact() {
   LeftOut open = at_open_seams();
   open_seams.clear();
+  box_edges.clear();
   if (!scene.colliders.empty())
     for (std::size_t s = 0; s < open.size(); ++s) open_seams.emplace_back(scene.sheets[s], open[s]);
   if (!scene.cloth_contact) return;
   if (!open.empty()) open = through_cloth_at_start(scene, open);
   cloth_contact.emplace(scene, open);
+  const auto is_box = [](const Collider& collider) {
+    return std::holds_alternative<Box>(collider.shape);
+  };
+  if (std::ranges::any_of(scene.colliders, is_box))
+    for (const SheetDefinition& sheet : scene.sheets) box_edges.emplace_back(sheet);
 }
 
 LeftOut Simulation::State::at_open_seams() const {
@@ -312,6 +323,7 @@ void Simulation::State::release_memory() {
   for (MovingSheet& sheet : sheets) sheet.release_memory();
   cloth_contact.reset();
   open_seams.clear();
+  box_edges.clear();
   bodies.release_memory();
   released = true;
 }

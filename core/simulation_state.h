@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/box_edges.h"
 #include "core/cloth_contact/cloth_contact.h"
 #include "core/contact/moving_bodies.h"
 #include "core/model/actions.h"
@@ -44,6 +45,7 @@ struct Simulation::State {
   std::vector<MovingSheet> sheets;
   std::optional<ClothContact> cloth_contact;
   std::vector<OpenSeams> open_seams;  // of each sheet, while they close
+  std::vector<BoxEdges> box_edges;    // of each sheet, with cloth contact where there are boxes
   MovingBodies bodies;
   std::vector<Grip> grips;  // their pins are among the scene's
   std::int64_t frame = 0;

@@ -42,6 +42,8 @@ class ClothContact {
   void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame);
   // How far that moved a particle at most, m.
   double moved() const { return corrected_; }
+  // After resolve(): something else moved particles by so much at most, m.
+  void follow(double moved) { come_ += 2 * moved; }
 
   // At the end of the last frame (cuts.h).
   std::int64_t count_cuts(std::span<const MovingSheet> sheets);

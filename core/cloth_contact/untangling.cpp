@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
 #include "core/cloth_contact/cuts.h"
 
@@ -27,7 +28,33 @@ void Untangling::find(NearBlocks& near, const Matrix3Xd& x, double speed) {
     for (const int i : cloth_.triangles[t])
       around[static_cast<std::size_t>(i)].push_back(static_cast<int>(t));
   at_cut_.resize(around.size());
-  for (const auto& [edge, triangle] : cuts) add(edge, triangle, around, x, speed);
+  // A crease that stays folded through itself is held so by the cloth beside it, which is on the
+  // wrong side too. Where more has passed through, that keeps it from passing farther.
+  constexpr double kSlow = 5;  // m/s
+  constexpr std::size_t kFew = 8;
+  const bool frees_beside = speed > kSlow && cuts.size() <= kFew;
+  for (const auto& [edge, triangle] : cuts) {
+    add(edge, triangle, around, x, speed);
+    if (frees_beside) free_beside(edge, triangle, around);
+  }
+}
+
+// Of an edge and a triangle that are joined by another triangle what lies around them is at the
+// cut.
+void Untangling::free_beside(int edge, int triangle, const Around& around) {
+  const auto& [p, q] = cloth_.edges[static_cast<std::size_t>(edge)];
+  const std::array<int, 3> corners = cloth_.triangles[static_cast<std::size_t>(triangle)];
+  const auto around_any = [&](std::initializer_list<int> particles, const auto& see) {
+    for (const int i : particles)
+      for (const int t : around[static_cast<std::size_t>(i)])
+        for (const int corner : cloth_.triangles[static_cast<std::size_t>(t)]) see(corner);
+  };
+  bool joined = false;
+  around_any({p, q},
+             [&](int i) { joined = joined || std::ranges::find(corners, i) != corners.end(); });
+  if (!joined) return;
+  around_any({p, q, corners[0], corners[1], corners[2]},
+             [&](int i) { at_cut_[static_cast<std::size_t>(i)] = true; });
 }
 
 bool Untangling::has(const std::array<int, 4>& particles) const {

@@ -43,6 +43,7 @@ class Untangling {
 
   using Around = std::vector<std::vector<int>>;  // triangles of each particle
   void add(int edge, int triangle, const Around& around, const Matrix3Xd& x, double speed);
+  void free_beside(int edge, int triangle, const Around& around);
 
   const Cloth& cloth_;
   std::vector<Pair> pairs_;

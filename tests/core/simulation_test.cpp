@@ -157,6 +157,8 @@ TEST(Simulation, APlanWarnsOfWhatTheModelLeavesOut) {
   scene.colliders = {{"table", Box{Vector3d::Zero(), Vector3d(1, 1, 1)}, 0.3, {}}};
   EXPECT_TRUE(warns(scene, "NO_SHEET_SHEET_COLLISION"));
   EXPECT_TRUE(warns(scene, "BOX_EDGES"));
+  scene.cloth_contact = true;
+  EXPECT_FALSE(warns(scene, "BOX_EDGES"));
 }
 
 // Of the lowest particle that falls on a rail.

@@ -136,6 +136,18 @@ Simulation triangles_with_far_collider() {
   return simulation(scene);
 }
 
+// With cloth contact, and a collider that it does not come near.
+Simulation triangles_in_contact(const decltype(Collider::shape)& far) {
+  Scene scene = draped();
+  scene.cloth_contact = true;
+  scene.colliders = {{"far", far, 0.3, {}}};
+  return simulation(scene);
+}
+Simulation triangles_with_far_ball() { return triangles_in_contact(Sphere{{50, 0, 0}, 0.1}); }
+Simulation triangles_with_far_box() {
+  return triangles_in_contact(Box{{50, 0, 0}, {0.1, 0.1, 0.1}});
+}
+
 Simulation triangles_with_wind() {
   Scene scene = draped();
   scene.environment.wind = Wind{};
@@ -188,6 +200,8 @@ int main(int count, char** arguments) {
       {"asleep", asleep},
       {"triangles", triangles},
       {"triangles_far_collider", triangles_with_far_collider},
+      {"triangles_far_ball", triangles_with_far_ball},
+      {"triangles_far_box", triangles_with_far_box},
       {"triangles_wind", triangles_with_wind},
       {"triangles_no_damping", triangles_without_damping},
       {"triangles_no_bending", triangles_without_bending},

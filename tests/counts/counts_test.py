@@ -53,6 +53,10 @@ class Counts(unittest.TestCase):
         self.assertLess(instructions("triangles_far_collider"), 1.02 * plain)
         self.assertGreater(instructions("triangles_wind"), 1.1 * plain)
 
+    def test_edges_of_a_box_out_of_reach_cost_nothing(self):
+        self.assertLess(instructions("triangles_far_box"),
+                        NOTHING * instructions("triangles_far_ball"))
+
     def test_bending_taken_from_triangles_costs_what_triangles_without_it_cost(self):
         self.assertLess(instructions("triangles_bending_taken_away"),
                         NOTHING * instructions("triangles_no_bending"))

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "core/cloth_contact/cuts.h"
 #include "core/simulation.h"
@@ -140,6 +143,56 @@ TEST(Untangling, SwatchesThatAreHeldTautComeApart) {
   EXPECT_GT(cuts_of(simulation), 10);
   for (int frame = 0; frame < 180 && cuts_of(simulation) > 0; ++frame) go_on(simulation, 1);
   EXPECT_EQ(cuts_of(simulation), 0);
+}
+
+// A bowl of which a particle has gone through what lies beside its neighbours.
+Scene folded_at_a_spot() {
+  SheetDefinition sheet = swatch("sheet");
+  Matrix3Xd x = start_positions(sheet);
+  const Vector3d middle = x.rowwise().mean();
+  Eigen::Index spot = 0;
+  (x.colwise() - middle).colwise().norm().minCoeff(&spot);
+  x.col(spot) += Vector3d(0.017, 0, 0.003);
+  for (auto at : x.colwise()) at.y() += 6 * (at - middle).squaredNorm();
+  x.col(spot).y() -= 2e-4;
+  sheet.start_positions = values(x);
+  return weightless({sheet}, 10);
+}
+
+// Of all sheets' particles, at a time, s: which contact leaves alone.
+std::vector<bool> freed_at(double time, const Scene& scene) {
+  std::vector<Matrix3Xd> starts;
+  for (const SheetDefinition& sheet : scene.sheets) starts.push_back(start_positions(sheet));
+  const Cloth cloth(scene.sheets, {});
+  const Matrix3Xd x = cloth.positions(starts);
+  NearBlocks near(cloth);
+  near.set(x);
+  Untangling untangling(cloth);
+  untangling.find(near, x, Untangling::speed_at(time));
+  std::vector<bool> freed;
+  for (int i = 0; i < cloth.particles(); ++i) freed.push_back(untangling.has({i, i, i, i}));
+  return freed;
+}
+
+TEST(Untangling, FreesWhatLiesBesideAFoldThroughItselfOnceItIsFast) {
+  const Scene scene = folded_at_a_spot();
+  const std::vector<bool> slow = freed_at(0, scene), fast = freed_at(0.9, scene);
+  EXPECT_GT(std::ranges::count(slow, true), 0);
+  EXPECT_EQ(slow, freed_at(0.7, scene));
+  EXPECT_GT(std::ranges::count(fast, true), std::ranges::count(slow, true));
+  for (std::size_t i = 0; i < slow.size(); ++i) EXPECT_LE(slow[i], fast[i]) << i;
+}
+
+TEST(Untangling, KeepsContactBesideTheLastCutsOfOneSheetThroughAnother) {
+  Scene scene = crossing(10);
+  SheetDefinition& other = scene.sheets[1];
+  Matrix3Xd x = start_positions(other);
+  x.row(2).array() += 0.04;  // so that it reaches a little way through
+  other.start_positions = values(x);
+  const std::int64_t cuts = cuts_of(Simulation(scene));
+  EXPECT_GT(cuts, 0);
+  EXPECT_LE(cuts, 8);
+  EXPECT_EQ(freed_at(0, scene), freed_at(0.9, scene));
 }
 
 TEST(Untangling, NothingRestsWhileItIsLedApart) {

@@ -65,7 +65,7 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   const std::int64_t settling = std::max<std::int64_t>(1, plan.step.substeps / kSettlings);
   const bool settles = is_relaxing() && relaxation->settling > 0;
   if (cloth_contact && unfinished->substeps == 0)
-    cloth_contact->untangle(sheets, untangling_speed(scene, begin));
+    cloth_contact->untangle(sheets, untangling_speed(scene, begin), pool);
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
     step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
     ++k;
@@ -90,7 +90,7 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
   if (!scene.colliders.empty()) bodies.place(scene.colliders, time + dt, dt);
   for (std::size_t s = 0; s < open_seams.size(); ++s)
     open_seams[s].keep_out(contacts_of(s, time, dt), dt, sheets[s]);
-  if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame);
+  if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame, pool);
 
   // colliders last, so that no particle ends a step inside one
   if (scene.colliders.empty()) return;
@@ -415,6 +415,8 @@ int Simulation::most_threads() const {
   int most = 1;
   for (const MovingSheet& sheet : state_->sheets)
     most = std::max(most, sheet.solver->most_threads());
+  if (state_->cloth_contact)
+    most = std::max(most, static_cast<int>(state_->particle_count() / kParticlesOfShare));
   return most;
 }
 

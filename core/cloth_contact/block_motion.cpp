@@ -16,7 +16,7 @@ void BlockMotion::forget() {
 }
 
 // By what particles moved by.
-void BlockMotion::box_ways() {
+void BlockMotion::box_ways(ThreadPool& pool) {
   if (box_.empty()) {
     box_.resize(4 * static_cast<std::size_t>(blocks_.blocks()));
     std::vector<NearBlocks::Node> nodes = {blocks_.root()};
@@ -28,17 +28,20 @@ void BlockMotion::box_ways() {
       nodes.push_back(node.half(1));
     }
   }
-  for (int b = 0; b < blocks_.blocks(); ++b) {
-    // by values that stay in registers
-    Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity()),
-                   high = -low;
-    for (const int i : blocks_.particles(b)) {
-      const Eigen::Array4f moved = Eigen::Array4f::MapAligned(by_.data() + 4 * std::ptrdiff_t{i});
-      low = low.min(moved);
-      high = high.max(moved);
+  constexpr int kLeastShare = 128;  // blocks, of a thread
+  for_shares(pool, blocks_.blocks(), kLeastShare, [&](std::int64_t begin, std::int64_t end) {
+    for (int b = static_cast<int>(begin); b < static_cast<int>(end); ++b) {
+      // by values that stay in registers
+      Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity()),
+                     high = -low;
+      for (const int i : blocks_.particles(b)) {
+        const Eigen::Array4f moved = Eigen::Array4f::MapAligned(by_.data() + 4 * std::ptrdiff_t{i});
+        low = low.min(moved);
+        high = high.max(moved);
+      }
+      box_[static_cast<std::size_t>(blocks_.number(b))] = {low, high};
     }
-    box_[static_cast<std::size_t>(blocks_.number(b))] = {low, high};
-  }
+  });
   for (const int node : joined_) {
     const Box &one = box_[static_cast<std::size_t>(2 * node)],
               &other = box_[static_cast<std::size_t>(2 * node + 1)];
@@ -46,20 +49,22 @@ void BlockMotion::box_ways() {
   }
 }
 
-void BlockMotion::set(const Matrix3Xd& from, const Matrix3Xd& to) {
+void BlockMotion::set(const Matrix3Xd& from, const Matrix3Xd& to, ThreadPool& pool) {
   rounding_ = 1e-12;
   by_.resize(4, to.cols());
-  for (Eigen::Index i = 0; i < to.cols(); ++i)
-    by_.col(i) << (to.col(i) - from.col(i)).cast<float>(), 0;
-  box_ways();
+  for_shares(pool, to.cols(), kParticlesOfShare, [&](Eigen::Index begin, Eigen::Index end) {
+    for (Eigen::Index i = begin; i < end; ++i)
+      by_.col(i) << (to.col(i) - from.col(i)).cast<float>(), 0;
+  });
+  box_ways(pool);
 }
 
-void BlockMotion::set(const Places& from, const Places& to) {
+void BlockMotion::set(const Places& from, const Places& to, ThreadPool& pool) {
   constexpr double kEach = 4 * 0x1p-24;  // of two places and their difference
   const float farthest = std::max(from.cwiseAbs().maxCoeff(), to.cwiseAbs().maxCoeff());
   rounding_ = 4 * std::sqrt(3.0) * kEach * double{farthest};
   by_ = to - from;
-  box_ways();
+  box_ways(pool);
 }
 
 }  // namespace weft

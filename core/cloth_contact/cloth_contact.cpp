@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <iterator>
 
 #include "core/cloth_contact/cuts.h"
 
@@ -35,13 +35,16 @@ void ClothContact::forget() {
   separation_ = {};
   begin_ = x_ = d_ = {};
   about_ = {};
-  own_x_ = {};
+  own_x_ = own_d_ = {};
   window_ = {};
+  cuts_.reset();
   come_ = moved_ = 0;
 }
 
-void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame) {
+void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame,
+                           ThreadPool& pool) {
   corrected_ = 0;
+  cuts_.reset();
   double in_step = 0, pushed = 0;  // in relation to each other
   for (const MovingSheet& sheet : sheets) {
     in_step = std::max(in_step, 2 * kMotionRounding * sheet.solver->moved());
@@ -50,7 +53,7 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
   come_ += pushed;
   // as where a pin jerks: positions before this step are still known
   if (come_ + in_step > window_.most_come) window_.steps = 0;
-  if (window_.steps == 0) begin_window(sheets, in_step);
+  if (window_.steps == 0) begin_window(sheets, in_step, pool);
   come_ += in_step;
   ++window_.steps;
   if (!ends_frame && window_.steps < window_.most_steps && come_ + in_step <= window_.reach) return;
@@ -61,15 +64,16 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
   window_ = {.most_steps = ends_frame ? 1 : most_steps(dt)};
   untangling_.lead(sheets, dt);
   if (is_known) {
-    if (!is_read) read(sheets);
-    act(sheets, ends_frame);
+    if (!is_read) read(sheets, pool);
+    act(sheets, ends_frame, pool);
   }
   if (ends_frame) separation_.forget_given();
-  if (lists_.empty()) look_ahead(sheets, in_step);
+  if (lists_.empty()) look_ahead(sheets, in_step, pool);
 }
 
 // Where nothing was near that may last as far as the next window goes.
-void ClothContact::look_ahead(std::span<const MovingSheet> sheets, double in_step) {
+void ClothContact::look_ahead(std::span<const MovingSheet> sheets, double in_step,
+                              ThreadPool& pool) {
   constexpr double kFaster = 1.1;  // the next step
   const double come = in_step + kSpare * reach(in_step);
   if (scene_.solver.plain || lists_.lasts() < 0 || moved_ + come_ + come <= lists_.lasts()) return;
@@ -79,11 +83,11 @@ void ClothContact::look_ahead(std::span<const MovingSheet> sheets, double in_ste
     sheets[s].solver->positions(own_x_);
     about_.block(0, cloth_.first_particle[s], 3, own_x_.cols()) = own_x_.cast<float>();
   }
-  lists_.look(about_, kFaster * come);
+  lists_.look(about_, kFaster * come, pool);
   moved_ = come_ = 0;
 }
 
-void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step) {
+void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step, ThreadPool& pool) {
   moved_ += come_;
   come_ = 0;
   window_.reach = reach(in_step);
@@ -91,11 +95,15 @@ void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step) {
   const bool holds = moved_ + window_.most_come <= lists_.lasts();
   window_.is_known = scene_.solver.plain || !lists_.empty() || !holds;
   if (!window_.is_known) return;
-  read(sheets);
-  begin_ = x_ - d_;
+  read(sheets, pool);
+  begin_.resize(3, x_.cols());
+  for_shares(pool, x_.cols(), kParticlesOfShare, [&](std::int64_t from, std::int64_t to) {
+    begin_.middleCols(from, to - from) =
+        x_.middleCols(from, to - from) - d_.middleCols(from, to - from);
+  });
   if (scene_.solver.plain || !lists_.empty()) return;
   // nothing was near: that may last
-  lists_.expect(begin_, window_.most_come);
+  lists_.expect(begin_, window_.most_come, pool);
   moved_ = 0;
   window_.is_known = !lists_.empty();
 }
@@ -107,7 +115,7 @@ double ClothContact::reach(double in_step) const {
 }
 
 // What may have met in the window.
-void ClothContact::find_near() {
+void ClothContact::find_near(ThreadPool& pool) {
   const double most = PairLists::kMostMotion * cloth_.thickest;
   near_.clear();
   const auto add = [&](const BlockPair& blocks, const Candidates& candidates, double come) {
@@ -129,7 +137,7 @@ void ClothContact::find_near() {
   }
   const bool last = moved_ + come_ <= lists_.lasts();
   if (!last) {
-    lists_.update(begin_, x_);
+    lists_.update(begin_, x_, pool);
     moved_ = 0;
   }
   const double come = std::min(come_, most);
@@ -138,78 +146,82 @@ void ClothContact::find_near() {
   });
 }
 
-void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame) {
-  find_near();
-  set_out();
-  separation_.touch(near_, untangling_, begin_, inverse_mass_, movers_,
-                    PairLists::kMostMotion * cloth_.thickest);
+void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPool& pool) {
+  find_near(pool);
+  const Separation::Ways ways{begin_, x_, d_, inverse_mass_};
+  separation_.touch(near_, untangling_, ways, PairLists::kMostMotion * cloth_.thickest, pool);
   if (separation_.empty()) return separation_.forget_given();
   const double steps =
       std::clamp(separation_.most_steps(), 1.0, static_cast<double>(window_.most_steps));
   if (!ends_frame) window_.most_steps = static_cast<int>(steps);
-  separation_.separate(steps, movers_);
+  separation_.separate(steps, ways);
   write(sheets);
 }
 
-void ClothContact::untangle(std::span<const MovingSheet> sheets, double speed) {
+// At the begin of a frame, or at its end: the next one begins there.
+const std::vector<ClothPair>& ClothContact::find_cuts(std::span<const MovingSheet> sheets,
+                                                      Matrix3Xd& x, ThreadPool& pool) {
+  cloth_.join([&](std::size_t s) -> const Matrix3Xd& { return sheets[s].good().x; }, x);
+  if (!cuts_) {
+    lists_.blocks().set(x, pool);
+    cuts_ = weft::find_cuts(cloth_, lists_.blocks(), x, pool);
+  }
+  return *cuts_;
+}
+
+void ClothContact::untangle(std::span<const MovingSheet> sheets, double speed, ThreadPool& pool) {
   const bool was_empty = untangling_.empty();
   untangling_.clear();
   if (speed > 0) {
     Matrix3Xd x;
-    cloth_.join([&](std::size_t s) -> const Matrix3Xd& { return sheets[s].good().x; }, x);
-    lists_.blocks().set(x);
-    untangling_.find(lists_.blocks(), x, speed);
+    const std::vector<ClothPair>& cuts = find_cuts(sheets, x, pool);
+    untangling_.set(cuts, x, speed);
   }
   if (!was_empty || !untangling_.empty()) forget();
 }
 
 std::int64_t ClothContact::count_cuts(std::span<const MovingSheet> sheets) {
   Matrix3Xd x;
-  cloth_.join([&](std::size_t s) -> const Matrix3Xd& { return sheets[s].good().x; }, x);
-  NearBlocks& blocks = lists_.blocks();
-  blocks.set(x);
-  return weft::count_cuts(cloth_, blocks, x, 0).count;
+  return std::ssize(find_cuts(sheets, x, calling_thread()));
 }
 
-void ClothContact::read(std::span<MovingSheet> sheets) {
+void ClothContact::read(std::span<MovingSheet> sheets, ThreadPool& pool) {
   x_.resize(3, cloth_.particles());
   d_.resize(3, cloth_.particles());
   inverse_mass_.resize(static_cast<std::size_t>(cloth_.particles()));
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const int first = cloth_.first_particle[s], count = cloth_.first_particle[s + 1] - first;
-    own_number_.resize(static_cast<std::size_t>(count));
-    std::iota(own_number_.begin(), own_number_.end(), 0);
-    sheets[s].solver->read(own_number_, x_.middleCols(first, count), d_.middleCols(first, count));
-    for (int i = 0; i < count; ++i)
-      inverse_mass_[static_cast<std::size_t>(first + i)] = sheets[s].dynamics.inverse_mass[i];
-  }
-}
-
-void ClothContact::set_out() {
-  movers_.resize(inverse_mass_.size());
-  for (std::size_t k = 0; k < movers_.size(); ++k) {
-    const auto column = static_cast<Eigen::Index>(k);
-    movers_[k].way << x_.col(column) - begin_.col(column), 0;
-    movers_[k].in_step << d_.col(column), 0;
+    for (int i = static_cast<int>(numbers_.size()); i < count; ++i) numbers_.push_back(i);
+    for_shares(pool, count, kParticlesOfShare, [&](std::int64_t begin, std::int64_t end) {
+      const auto own = std::span(numbers_).subspan(static_cast<std::size_t>(begin),
+                                                   static_cast<std::size_t>(end - begin));
+      sheets[s].solver->read(own, x_.middleCols(first + begin, end - begin),
+                             d_.middleCols(first + begin, end - begin));
+    });
+    Eigen::VectorXd::Map(inverse_mass_.data() + first, count) = sheets[s].dynamics.inverse_mass;
   }
 }
 
 // To those that moved: others keep their bits.
 void ClothContact::write(std::span<MovingSheet> sheets) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
+    const int first = cloth_.first_particle[s], end = cloth_.first_particle[s + 1];
+    own_x_.resize(3, end - first);
+    own_d_.resize(3, end - first);
     changed_.clear();
     Eigen::Index n = 0;
-    for (int i = cloth_.first_particle[s]; i < cloth_.first_particle[s + 1]; ++i) {
-      const Mover& mover = movers_[static_cast<std::size_t>(i)];
+    for (const int i : separation_.particles()) {
+      if (i < first || i >= end) continue;
+      const Mover& mover = separation_.mover(i);
       const Vector3d by = mover.way.head<3>() - (x_.col(i) - begin_.col(i)),
                      in_step = mover.in_step.head<3>() - d_.col(i);
       if (by.isZero(0) && in_step.isZero(0)) continue;
       corrected_ = std::max(corrected_, kMotionRounding * by.norm());
-      changed_.push_back(i - cloth_.first_particle[s]);
-      x_.col(n) = by;
-      d_.col(n++) = in_step;
+      changed_.push_back(i - first);
+      own_x_.col(n) = by;
+      own_d_.col(n++) = in_step;
     }
-    if (n > 0) sheets[s].solver->displace(changed_, x_.leftCols(n), d_.leftCols(n));
+    if (n > 0) sheets[s].solver->displace(changed_, own_x_.leftCols(n), own_d_.leftCols(n));
   }
   come_ += 2 * corrected_;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -35,11 +36,13 @@ class ClothContact {
   // Looks for cloth that has passed through cloth at the begin of a frame: until the next call such
   // pairs do not keep each other apart, but are led apart at up to `speed`, m/s (untangling.h). At
   // 0 they stay so.
-  void untangle(std::span<const MovingSheet> sheets, double speed);
+  void untangle(std::span<const MovingSheet> sheets, double speed,
+                ThreadPool& pool = calling_thread());
   // Whether there are any.
   bool untangles() const { return !untangling_.empty(); }
   // Of sheets that have taken a step of dt, s.
-  void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame);
+  void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame,
+               ThreadPool& pool = calling_thread());
   // How far that moved a particle at most, m.
   double moved() const { return corrected_; }
   // After resolve(): something else moved particles by so much at most, m.
@@ -58,13 +61,14 @@ class ClothContact {
   };
 
   double reach(double in_step) const;
-  void begin_window(std::span<MovingSheet> sheets, double in_step);
-  void act(std::span<MovingSheet> sheets, bool ends_frame);
-  void find_near();
-  void look_ahead(std::span<const MovingSheet> sheets, double in_step);
-  void read(std::span<MovingSheet> sheets);
-  void set_out();
+  void begin_window(std::span<MovingSheet> sheets, double in_step, ThreadPool& pool);
+  void act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPool& pool);
+  void find_near(ThreadPool& pool);
+  void look_ahead(std::span<const MovingSheet> sheets, double in_step, ThreadPool& pool);
+  void read(std::span<MovingSheet> sheets, ThreadPool& pool);
   void write(std::span<MovingSheet> sheets);
+  const std::vector<ClothPair>& find_cuts(std::span<const MovingSheet> sheets, Matrix3Xd& x,
+                                          ThreadPool& pool);
 
   const Scene& scene_;
   Cloth cloth_;
@@ -80,11 +84,12 @@ class ClothContact {
   std::vector<double> inverse_mass_;  // of all particles, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m
   Places about_;                      // now
-  Matrix3Xd own_x_;                   // of a sheet, m
+  Matrix3Xd own_x_, own_d_;           // of a sheet, m
   Separation separation_;
   Untangling untangling_;
-  std::vector<Mover> movers_;
-  std::vector<int> own_number_, changed_;  // of a sheet, by its own numbers
+  std::vector<int> changed_;                    // of a sheet, by its own numbers
+  std::vector<int> numbers_;                    // 0, 1, ... of the largest sheet
+  std::optional<std::vector<ClothPair>> cuts_;  // where nothing has moved since
 };
 
 }  // namespace weft

@@ -16,9 +16,9 @@ ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vect
   return count_cuts(cloth, near, all, most_told);
 }
 
-std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x) {
-  std::vector<ClothPair> found;
-  const auto look = [&](int edges_of, int triangle) {
+std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
+                                 ThreadPool& pool) {
+  const auto look = [&](int edges_of, int triangle, std::vector<ClothPair>& found) {
     const auto& [a, b, c] = cloth.triangles[static_cast<std::size_t>(triangle)];
     const Eigen::Array3d low = x.col(a).cwiseMin(x.col(b)).cwiseMin(x.col(c)),
                          high = x.col(a).cwiseMax(x.col(b)).cwiseMax(x.col(c));
@@ -34,20 +34,26 @@ std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Mat
       if (cuts(x.col(p), x.col(q), x.col(a), x.col(b), x.col(c))) found.push_back({e, triangle});
     }
   };
-  for (const BlockPair& blocks : near.meet(0)) {
-    if (near.distance(blocks) > 0) continue;
-    for (const auto& [one, other] : near.near_triangles(blocks, 0)) {
-      look(one, other);
-      look(other, one);
+  const std::vector<BlockPair> all = near.meet(0);
+  constexpr int kLeastShare = 64;
+  const auto find = [&](std::int64_t begin, std::int64_t end, std::vector<ClothPair>& found) {
+    NearBlocks::Search search;
+    for (std::int64_t k = begin; k < end; ++k) {
+      const BlockPair& blocks = all[static_cast<std::size_t>(k)];
+      if (near.distance(blocks) > 0) continue;
+      for (const auto& [one, other] : near.near_triangles(blocks, 0, search)) {
+        look(one, other, found);
+        look(other, one, found);
+      }
     }
-  }
-  return found;
+  };
+  return find_in_shares<ClothPair>(pool, std::ssize(all), kLeastShare, find);
 }
 
 ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
-                     std::size_t most_told) {
+                     std::size_t most_told, ThreadPool& pool) {
   std::vector<ClothCut> found;
-  for (const auto& [edge, triangle] : find_cuts(cloth, near, x)) {
+  for (const auto& [edge, triangle] : find_cuts(cloth, near, x, pool)) {
     const auto& [p, q] = cloth.edges[static_cast<std::size_t>(edge)];
     const auto& [a, b, c] = cloth.triangles[static_cast<std::size_t>(triangle)];
     found.push_back({static_cast<std::size_t>(cloth.sheet_of(p)),

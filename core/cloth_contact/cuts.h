@@ -28,9 +28,10 @@ struct ClothCuts {
 ClothCuts count_cuts(const std::vector<SheetDefinition>& sheets, const std::vector<Matrix3Xd>& x,
                      std::size_t most_told = 10);
 // Edges and triangles that they pass through, of cloth at x, where its blocks are.
-std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x);
+std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
+                                 ThreadPool& pool = calling_thread());
 // Of the same.
 ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
-                     std::size_t most_told);
+                     std::size_t most_told, ThreadPool& pool = calling_thread());
 
 }  // namespace weft

@@ -125,7 +125,7 @@ FlatPatches::FlatPatches(const Cloth& cloth) : cloth_(cloth) {
   for (const auto& [ends, side] : sides)
     if (side.first != 2) borders_.push_back(side.second);
   gradients_.resize(blocks);
-  known_.resize(blocks);
+  are_made_ = std::vector<MadeOnce>(blocks);
 }
 
 std::size_t FlatPatches::Hash::operator()(const std::array<int, 4>& blocks) const {
@@ -138,7 +138,6 @@ void FlatPatches::set(const Eigen::Matrix4Xf& places, double farthest) {
   places_ = &places;
   farthest_ = farthest;
   ++now_;
-  std::fill(known_.begin(), known_.end(), false);
 }
 
 double FlatPatches::distance(const Blocks& some, const Blocks& others) {
@@ -148,10 +147,7 @@ double FlatPatches::distance(const Blocks& some, const Blocks& others) {
   if (first != last) return 0;
   Patch& over = patch(some, others);
   if (!over.whole) return 0;
-  if (over.asked_at != now_) {
-    over.asked_at = now_;
-    over.distance = distance(over);
-  }
+  over.has_distance.in(now_, [&] { over.distance = distance(over); });
   return over.distance;
 }
 
@@ -200,13 +196,16 @@ double FlatPatches::distance(const Patch& over) {
   return factor > 0 ? factor * over.least_height : 0;
 }
 
-// Over these blocks and what lies between them.
 FlatPatches::Patch& FlatPatches::patch(const Blocks& some, const Blocks& others) {
-  const auto [place, is_new] =
-      patches_.try_emplace({some.first, some.last, others.first, others.last});
-  Patch& patch = place->second;
-  if (!is_new) return patch;
+  std::unique_lock lock(mutex_);
+  Patch& patch = patches_[{some.first, some.last, others.first, others.last}];
+  lock.unlock();
+  patch.is_made.in(1, [&] { make(some, others, patch); });
+  return patch;
+}
 
+// Over these blocks and what lies between them.
+void FlatPatches::make(const Blocks& some, const Blocks& others, Patch& patch) const {
   const auto a = static_cast<std::size_t>(some.first);
   const int piece = cloth_.piece[a];
   std::vector<Vector2d> corners;
@@ -224,7 +223,7 @@ FlatPatches::Patch& FlatPatches::patch(const Blocks& some, const Blocks& others)
            box.intersects(Box(border.from.cwiseMin(border.to), border.from.cwiseMax(border.to))) &&
            passes_inside(hull, border.from, border.to, depth);
   });
-  if (!patch.whole) return patch;
+  if (!patch.whole) return;
   patch.least_height = std::numeric_limits<double>::infinity();
   for (std::size_t c = 0; c < hull_.size(); ++c) {
     if (cloth_.piece[c] != piece || !box.intersects(box_[c]) || !may_meet(hull, hull_[c]) ||
@@ -233,14 +232,16 @@ FlatPatches::Patch& FlatPatches::patch(const Blocks& some, const Blocks& others)
     patch.blocks.push_back(static_cast<int>(c));
     patch.least_height = std::min(patch.least_height, least_height_[c]);
   }
-  return patch;
 }
 
 const FlatPatches::Gradients& FlatPatches::gradients(int block) {
   const auto b = static_cast<std::size_t>(block);
-  Gradients& gradients = gradients_[b];
-  if (known_[b]) return gradients;
-  known_[b] = true;
+  are_made_[b].in(now_, [&] { make(block, gradients_[b]); });
+  return gradients_[b];
+}
+
+void FlatPatches::make(int block, Gradients& gradients) const {
+  const auto b = static_cast<std::size_t>(block);
   gradients.each.clear();
   const float* places = places_->data();
   const auto place = [&](int i) -> Eigen::Array4f {
@@ -291,7 +292,6 @@ const FlatPatches::Gradients& FlatPatches::gradients(int block) {
   };
   gradients.middle = gradient((low + high) / 2, (low_out + high_out) / 2);
   gradients.half = gradient((high - low) / 2, (high_out - low_out) / 2);
-  return gradients;
 }
 
 }  // namespace weft

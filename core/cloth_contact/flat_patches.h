@@ -3,10 +3,13 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <mutex>
 #include <unordered_map>
 #include <vector>
 
 #include "core/cloth_contact/cloth.h"
+#include "core/cloth_contact/made_once.h"
 
 namespace weft {
 
@@ -28,7 +31,7 @@ class FlatPatches {
     int first, last;
   };
   // The least distance between particles and edges of some blocks and others, or within these, that
-  // share no particle, at least, m; 0 where none is known.
+  // share no particle, at least, m; 0 where none is known. Threads may ask at the same time.
   double distance(const Blocks& some, const Blocks& others);
 
  private:
@@ -45,10 +48,11 @@ class FlatPatches {
   using Box = Eigen::AlignedBox2d;
   using Polygon = std::vector<Vector2d>;  // convex, anticlockwise
   struct Patch {
+    MadeOnce is_made;
     bool whole = false;       // no border lies inside
     double least_height = 0;  // of its triangles, m
     std::vector<int> blocks;
-    int asked_at = 0;     // when the distance was found
+    MadeOnce has_distance;
     double distance = 0;  // m
   };
   struct Border {
@@ -61,8 +65,10 @@ class FlatPatches {
   };
 
   Patch& patch(const Blocks& some, const Blocks& others);
+  void make(const Blocks& some, const Blocks& others, Patch& patch) const;
   double distance(const Patch& over);
   const Gradients& gradients(int block);
+  void make(int block, Gradients& gradients) const;
 
   const Cloth& cloth_;
   // of each triangle's sides in the flat shape, as rows of a gradient, 1/m
@@ -71,13 +77,14 @@ class FlatPatches {
   std::vector<Box> box_;              // around these
   std::vector<double> least_height_;  // of each block, m
   std::vector<Border> borders_;
+  std::mutex mutex_;  // of patches_, but not of what is in these
   std::unordered_map<std::array<int, 4>, Patch, Hash> patches_;
 
   const Eigen::Matrix4Xf* places_ = nullptr;
   double farthest_ = 0;               // m
-  int now_ = 0;                       // counts what was set
+  std::int64_t now_ = 0;              // counts what was set
   std::vector<Gradients> gradients_;  // of each block
-  std::vector<bool> known_;           // which of them are of x
+  std::vector<MadeOnce> are_made_;    // these, of places
 };
 
 }  // namespace weft

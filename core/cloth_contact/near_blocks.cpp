@@ -8,7 +8,8 @@ NearBlocks::NearBlocks(const Cloth& cloth)
     : cloth_(cloth),
       flat_(cloth),
       box_(cloth.first_block.size() - 1),
-      boxed_(box_.size()),
+      is_boxed_(box_.size()),
+      has_boxes_(box_.size()),
       triangle_box_(cloth.triangles.size()),
       edge_box_(cloth.edges.size()) {
   nodes_.resize(4 * box_.size());
@@ -27,26 +28,30 @@ NearBlocks::NearBlocks(const Cloth& cloth)
   }
 }
 
-void NearBlocks::set(const Matrix3Xd& x) {
+void NearBlocks::set(const Matrix3Xd& x, ThreadPool& pool) {
   constexpr double kOfTwo = 8 * 0x1p-24;  // places, of their difference and of the reach
   const double farthest = x.size() > 0 ? x.cwiseAbs().maxCoeff() : 0.0;
   x_ = &x;
   about_.resize(4, x.cols());
-  for (Eigen::Index i = 0; i < x.cols(); ++i) about_.col(i) << x.col(i).cast<float>(), 0;
+  for_shares(pool, x.cols(), kParticlesOfShare, [&](Eigen::Index begin, Eigen::Index end) {
+    for (Eigen::Index i = begin; i < end; ++i) about_.col(i) << x.col(i).cast<float>(), 0;
+  });
   rounding_ = kOfTwo * farthest;
   flat_.set(about_, farthest);
-  std::fill(boxed_.begin(), boxed_.end(), false);
-  for (Box& box : box_) box.setEmpty();
-  for (Box& box : nodes_) box.setEmpty();
+  ++now_;
+  for (const int node : known_nodes_) nodes_[static_cast<std::size_t>(node)].setEmpty();
+  known_nodes_.clear();
 }
 
 const NearBlocks::Box& NearBlocks::block_box(int block) {
   const auto b = static_cast<std::size_t>(block);
-  Box& box = box_[b];
-  if (box.isEmpty())
+  is_boxed_[b].in(now_, [&] {
+    Box box;
     for (int k = first_particle_[b]; k < first_particle_[b + 1]; ++k)
       box.extend(x_->col(particles_[static_cast<std::size_t>(k)]));
-  return box;
+    box_[b] = box;
+  });
+  return box_[b];
 }
 
 std::vector<BlockPair> NearBlocks::meet(double reach) {
@@ -60,6 +65,7 @@ std::vector<BlockPair> NearBlocks::meet(double reach) {
 
 void NearBlocks::box_node(const Node& node) {
   if (!box(node).isEmpty()) return;
+  known_nodes_.push_back(node.number);
   if (node.count() == 1) {
     box(node) = block_box(node.first);
     return;
@@ -94,20 +100,20 @@ double NearBlocks::distance(const BlockPair& blocks, double enough) {
 
 void NearBlocks::box_parts(int block) {
   const auto b = static_cast<std::size_t>(block);
-  if (boxed_[b]) return;
-  boxed_[b] = true;
-  const auto first = static_cast<std::size_t>(cloth_.first_block[b]),
-             last = static_cast<std::size_t>(cloth_.first_block[b + 1]);
-  for (std::size_t t = first; t < last; ++t) {
-    const auto& [i, j, k] = cloth_.triangles[t];
-    const Eigen::Array4f p = place(i), q = place(j), r = place(k);
-    triangle_box_[t] = {p.min(q).min(r), p.max(q).max(r)};
-  }
-  for (int e = cloth_.first_edge[first]; e < cloth_.first_edge[last]; ++e) {
-    const auto& [i, j] = cloth_.edges[static_cast<std::size_t>(e)];
-    const Eigen::Array4f p = place(i), q = place(j);
-    edge_box_[static_cast<std::size_t>(e)] = {p.min(q), p.max(q)};
-  }
+  has_boxes_[b].in(now_, [&] {
+    const auto first = static_cast<std::size_t>(cloth_.first_block[b]),
+               last = static_cast<std::size_t>(cloth_.first_block[b + 1]);
+    for (std::size_t t = first; t < last; ++t) {
+      const auto& [i, j, k] = cloth_.triangles[t];
+      const Eigen::Array4f p = place(i), q = place(j), r = place(k);
+      triangle_box_[t] = {p.min(q).min(r), p.max(q).max(r)};
+    }
+    for (int e = cloth_.first_edge[first]; e < cloth_.first_edge[last]; ++e) {
+      const auto& [i, j] = cloth_.edges[static_cast<std::size_t>(e)];
+      const Eigen::Array4f p = place(i), q = place(j);
+      edge_box_[static_cast<std::size_t>(e)] = {p.min(q), p.max(q)};
+    }
+  });
 }
 
 // Of first ... last - 1 those near a block.
@@ -167,39 +173,44 @@ void NearBlocks::choose_corners(int block, int near, double reach, SmallBoxes& c
 }
 
 // Of those chosen and others all that are near each other.
-std::span<const ClothPair> NearBlocks::meet_chosen(double reach, bool ascending) {
+std::span<const ClothPair> NearBlocks::meet_chosen(double reach, bool ascending,
+                                                   Search& search) const {
+  auto& [chosen, others, met] = search;
   const auto most = static_cast<float>(reach + rounding_);
-  const std::size_t count = chosen_.box.size() * others_.box.size();
-  if (met_.size() < count) met_.resize(count);
+  const std::size_t count = chosen.box.size() * others.box.size();
+  if (met.size() < count) met.resize(count);
   std::size_t n = 0;
-  for (std::size_t k = 0; k < chosen_.box.size(); ++k) {
-    const SmallBox own = chosen_.box[k];
-    const int number = chosen_.number[k];
-    for (std::size_t l = ascending ? k + 1 : 0; l < others_.box.size(); ++l) {
-      const SmallBox& there = others_.box[l];
-      met_[n] = {number, others_.number[l]};
+  for (std::size_t k = 0; k < chosen.box.size(); ++k) {
+    const SmallBox own = chosen.box[k];
+    const int number = chosen.number[k];
+    for (std::size_t l = ascending ? k + 1 : 0; l < others.box.size(); ++l) {
+      const SmallBox& there = others.box[l];
+      met[n] = {number, others.number[l]};
       n += (there.low - own.high).max(own.low - there.high).maxCoeff() <= most ? 1 : 0;
     }
   }
-  return std::span(met_).first(n);
+  return std::span(met).first(n);
 }
 
-std::span<const ClothPair> NearBlocks::near_triangles(const BlockPair& blocks, double reach) {
-  choose_triangles(blocks.one, blocks.other, reach, chosen_);
-  choose_triangles(blocks.other, blocks.one, reach, others_);
-  return meet_chosen(reach, blocks.one == blocks.other);
+std::span<const ClothPair> NearBlocks::near_triangles(const BlockPair& blocks, double reach,
+                                                      Search& search) {
+  choose_triangles(blocks.one, blocks.other, reach, search.chosen_);
+  choose_triangles(blocks.other, blocks.one, reach, search.others_);
+  return meet_chosen(reach, blocks.one == blocks.other, search);
 }
 
-std::span<const ClothPair> NearBlocks::near_edges(const BlockPair& blocks, double reach) {
-  choose_edges(blocks.one, blocks.other, reach, chosen_);
-  choose_edges(blocks.other, blocks.one, reach, others_);
-  return meet_chosen(reach, blocks.one == blocks.other);
+std::span<const ClothPair> NearBlocks::near_edges(const BlockPair& blocks, double reach,
+                                                  Search& search) {
+  choose_edges(blocks.one, blocks.other, reach, search.chosen_);
+  choose_edges(blocks.other, blocks.one, reach, search.others_);
+  return meet_chosen(reach, blocks.one == blocks.other, search);
 }
 
-std::span<const ClothPair> NearBlocks::near_corners(int one, int other, double reach) {
-  choose_corners(one, other, reach, chosen_);
-  choose_triangles(other, one, reach, others_);
-  return meet_chosen(reach, false);
+std::span<const ClothPair> NearBlocks::near_corners(int one, int other, double reach,
+                                                    Search& search) {
+  choose_corners(one, other, reach, search.chosen_);
+  choose_triangles(other, one, reach, search.others_);
+  return meet_chosen(reach, false, search);
 }
 
 }  // namespace weft

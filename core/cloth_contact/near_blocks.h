@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <compare>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "core/cloth_contact/flat_patches.h"
+#include "core/motion/thread_pool.h"
 
 namespace weft {
 
@@ -47,7 +49,7 @@ class NearBlocks {
   // Of a block: the node that has it alone.
   int number(int block) const { return number_[static_cast<std::size_t>(block)]; }
   // From now on cloth is at x, (3 x particles) m, which outlives what is asked.
-  void set(const Matrix3Xd& x);
+  void set(const Matrix3Xd& x, ThreadPool& pool = calling_thread());
   const Places& places() const { return about_; }
   // Two blocks, or a block and itself, whose boxes are no farther apart than `reach`, m, along any
   // axis; in ascending order.
@@ -68,6 +70,7 @@ class NearBlocks {
   }
   // The least distance between what shares no particle in two blocks, at least, m; 0 where that
   // takes a closer look. The closest is not looked for where it is `enough`.
+  // Threads may ask at the same time.
   double distance(const BlockPair& blocks, double enough = 0);
   // The same of all blocks of two nodes, or of one, m.
   double distance(const Node& one, const Node& other, double enough) {
@@ -84,10 +87,12 @@ class NearBlocks {
   }
   // Of two blocks every two triangles, every two edges, or every particle of the one and triangle
   // of the other, whose boxes are no farther apart than `reach`, m; rounding may add some. Until
-  // one of these is called again.
-  std::span<const ClothPair> near_triangles(const BlockPair& blocks, double reach);
-  std::span<const ClothPair> near_edges(const BlockPair& blocks, double reach);
-  std::span<const ClothPair> near_corners(int one, int other, double reach);
+  // one of these is called again with the same search. Threads may ask at the same time, each with
+  // its own.
+  class Search;
+  std::span<const ClothPair> near_triangles(const BlockPair& blocks, double reach, Search& search);
+  std::span<const ClothPair> near_edges(const BlockPair& blocks, double reach, Search& search);
+  std::span<const ClothPair> near_corners(int one, int other, double reach, Search& search);
   // Of a block.
   std::span<const int> particles(int block) const {
     const auto b = static_cast<std::size_t>(block);
@@ -140,20 +145,26 @@ class NearBlocks {
   void choose_triangles(int block, int near, double reach, SmallBoxes& chosen);
   void choose_edges(int block, int near, double reach, SmallBoxes& chosen);
   void choose_corners(int block, int near, double reach, SmallBoxes& chosen);
-  std::span<const ClothPair> meet_chosen(double reach, bool ascending);
+  std::span<const ClothPair> meet_chosen(double reach, bool ascending, Search& search) const;
 
   const Cloth& cloth_;
   FlatPatches flat_;
   std::vector<int> first_particle_, particles_;  // of each block
-  std::vector<Box> nodes_, box_;                 // empty where not known
-  std::vector<bool> boxed_;                      // of each block: its parts
-  std::vector<int> number_;                      // of each block
-  std::vector<FlatPatches::Blocks> around_;      // each: some that may be flat together
+  std::vector<Box> nodes_, box_;                 // nodes: empty where not known
+  std::vector<int> known_nodes_;
+  std::int64_t now_ = 0;                        // counts what was set
+  std::vector<MadeOnce> is_boxed_, has_boxes_;  // each block; its parts
+  std::vector<int> number_;                     // of each block
+  std::vector<FlatPatches::Blocks> around_;     // each: some that may be flat together
 
   const Matrix3Xd* x_ = nullptr;
   Places about_;         // the same
   double rounding_ = 0;  // of the gap between small boxes, m
   std::vector<SmallBox> triangle_box_, edge_box_;
+};
+
+class NearBlocks::Search {
+  friend NearBlocks;
   SmallBoxes chosen_, others_;
   std::vector<ClothPair> met_;
 };

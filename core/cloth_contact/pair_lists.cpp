@@ -6,6 +6,15 @@
 #include <utility>
 
 namespace weft {
+namespace {
+
+template <class T>
+std::span<T> part_of(std::vector<T>& all, std::int64_t begin, std::int64_t end) {
+  return std::span(all).subspan(static_cast<std::size_t>(begin),
+                                static_cast<std::size_t>(end - begin));
+}
+
+}  // namespace
 
 PairLists::PairLists(const Cloth& cloth)
     : cloth_(cloth), blocks_(cloth), since_(blocks_), in_window_(blocks_) {}
@@ -15,76 +24,109 @@ void PairLists::forget() {
   before_about_ = {};
   states_ = {};
   lists_ = decltype(lists_)();
-  apart_ = still_apart_ = {};
+  apart_ = reopened_ = {};
   since_.forget();
   in_window_.forget();
   near_ = met_ = 0;
   lasts_ = -1;
 }
 
-void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now) {
-  in_window_.set(from, now);
+void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& pool) {
+  in_window_.set(from, now, pool);
   look(
-      from, [&](int one, int other) { return length(in_window_.between(one, other)); }, 0);
+      from, [&](int one, int other) { return length(in_window_.between(one, other)); }, 0, pool);
 }
 
-void PairLists::expect(const Matrix3Xd& from, double come) {
+void PairLists::expect(const Matrix3Xd& from, double come, ThreadPool& pool) {
   // when it does not hold any more much else will soon not
   look(
-      from, [&](int, int) { return length(come); }, 0.5 * cloth_.thickest);
+      from, [&](int, int) { return length(come); }, 0.5 * cloth_.thickest, pool);
 }
 
 // came(one, other): how far two nodes come in relation to each other in the window, m. What holds
 // for less than `spare` beyond that is made anew, too, m.
 template <class Came>
-void PairLists::look(const Matrix3Xd& x, const Came& came, double spare) {
-  const double thickest = cloth_.thickest;
-  blocks_.set(x);
+void PairLists::look(const Matrix3Xd& x, const Came& came, double spare, ThreadPool& pool) {
+  constexpr std::int64_t kLeastShare = 1024, kLeastCloser = 8;  // of a thread
+  blocks_.set(x, pool);
+  std::vector<std::size_t> closer;  // of apart_
   if (before_.cols() > 0) {
-    since_.set(before_, x);
-    for (State& state : states_) {
-      const double by = since_.between(number(state.blocks.one), number(state.blocks.other));
-      state.left -= by;
-      state.near_left -= by;
-    }
-    for (Apart& apart : apart_) apart.left -= since_.between(apart.one.number, apart.other.number);
+    since_.set(before_, x, pool);
+    for_shares(pool, std::ssize(states_), kLeastShare, [&](std::int64_t begin, std::int64_t end) {
+      for (State& state : part_of(states_, begin, end)) {
+        const double by = since_.between(number(state.blocks.one), number(state.blocks.other));
+        state.left -= by;
+        state.near_left -= by;
+      }
+    });
+    const auto find_closer = [&](std::int64_t begin, std::int64_t end,
+                                 std::vector<std::size_t>& found) {
+      for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+        auto& [one, other, left] = apart_[k];
+        left -= since_.between(one.number, other.number);
+        if (!(left >= came(one.number, other.number) + spare)) found.push_back(k);
+      }
+    };
+    closer = find_in_shares<std::size_t>(pool, std::ssize(apart_), kLeastShare, find_closer);
   }
-  meet(came, spare);
+  meet(came, spare, closer);
   before_ = x;
   before_about_ = blocks_.places();
 
-  lasts_ = kMostMotion * thickest;
+  const auto is_due = [&](const State& state) {
+    return !(state.left >= state.came + spare) ||
+           (state.has_some && !(state.near_left >= state.came + spare / 2));
+  };
+  const auto find_due = [&](std::int64_t begin, std::int64_t end, std::vector<std::size_t>& found) {
+    for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+      State& state = states_[k];
+      state.came = came(number(state.blocks.one), number(state.blocks.other));
+      if (is_due(state)) found.push_back(k);
+    }
+  };
+  auto due = find_in_shares<std::size_t>(pool, std::ssize(states_), kLeastShare, find_due);
+  const std::size_t shares = shares_of(pool, std::ssize(due), kLeastCloser);
+  if (scratch_.size() < shares) scratch_.resize(shares);
+  run_shares(pool, shares, std::ssize(due),
+             [&](std::size_t share, std::int64_t begin, std::int64_t end) {
+               for (const std::size_t k : part_of(due, begin, end))
+                 look_closer(x, spare, scratch_[share], states_[k], *lists_[k]);
+             });
+
+  lasts_ = kMostMotion * cloth_.thickest;
   near_ = 0;
-  for (std::size_t k = 0; k < states_.size(); ++k) {
-    State& state = states_[k];
-    // some windows pass until they are looked at again; lists of flat cloth stay empty: what
-    // shares no particle there is 2.8 thicknesses apart
-    const double comes = state.came = came(number(state.blocks.one), number(state.blocks.other));
-    if (!(state.left >= comes + spare))
-      renew(x, least_left(comes),
-            std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + 3 * spare, state,
-            *lists_[k]);
-    if (state.has_some && !(state.near_left >= comes + spare / 2))
-      prune(
-          x,
-          comes + (spare > 0 ? spare / 2 : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
-          state, *lists_[k]);
+  for (const State& state : states_) {
     lasts_ = std::min(lasts_, state.has_some ? state.near_left : state.left);
     if (state.is_near) ++near_;
   }
   for (const Apart& apart : apart_) lasts_ = std::min(lasts_, apart.left);
 }
 
-void PairLists::look(const Places& now, double come) {
+// Some windows pass until it is looked at again. Lists of flat cloth stay empty: what shares no
+// particle there is 2.8 thicknesses apart.
+void PairLists::look_closer(const Matrix3Xd& x, double spare, Scratch& scratch, State& state,
+                            List& list) {
+  const double thickest = cloth_.thickest, comes = state.came;
+  if (!(state.left >= comes + spare))
+    renew(x, least_left(comes),
+          std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + 3 * spare, scratch,
+          state, list);
+  if (state.has_some && !(state.near_left >= comes + spare / 2))
+    prune(x,
+          comes + (spare > 0 ? spare / 2 : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
+          state, list);
+}
+
+void PairLists::look(const Places& now, double come, ThreadPool& pool) {
   constexpr std::size_t kShare = 8;  // of all: more are looked at anew together
-  since_.set(before_about_, now);
+  since_.set(before_about_, now, pool);
   const double rounding = since_.rounding();
   const std::size_t most = (states_.size() + apart_.size()) / kShare;
   std::size_t closer = 0;
   const auto look_closer = [&] {
     if (closer++ > 0) return closer <= most;
     now_all_ = now.topRows<3>().cast<double>();
-    blocks_.set(now_all_);
+    blocks_.set(now_all_, pool);
     return true;
   };
   lasts_ = kMostMotion * cloth_.thickest;
@@ -114,14 +156,15 @@ double PairLists::left_at(const Matrix3Xd& x, const State& state, const List& li
                           double enough) {
   if (list.made_at.cols() == 0)
     return blocks_.distance(state.blocks, cloth_.thickest + enough) - cloth_.thickest;
-  if (left < enough) left = std::max(left, list.reach - change(x, state.blocks, list));
-  if (state.has_some && left >= enough) nearer(list.all, x, 0, some_near_, left);
+  auto& [search, now, near] = scratch_.front();
+  if (left < enough) left = std::max(left, list.reach - change(x, state.blocks, list, now));
+  if (state.has_some && left >= enough) nearer(list.all, x, 0, near, left);
   return left;
 }
 
-// Has states for all blocks that may be near.
+// Has states for all blocks that may be near. closer: of those that were apart, ascending.
 template <class Came>
-void PairLists::meet(const Came& came, double spare) {
+void PairLists::meet(const Came& came, double spare, const std::vector<std::size_t>& closer) {
   constexpr double kApart = 1.5;  // of the thickest cloth, beside what it comes
   constexpr int kMostLooks = 64;  // until others may lie flat together
   const bool all =
@@ -136,21 +179,21 @@ void PairLists::meet(const Came& came, double spare) {
       left = blocks_.distance_if_flat(one, other) - cloth_.thickest;
       if (left < least_left(comes) + spare) return false;
     }
-    still_apart_.push_back({one, other, left});
+    apart_.push_back({one, other, left});
     return true;
   };
   const auto near = [&](const BlockPair& blocks) { met.push_back(blocks); };
-  still_apart_.clear();
   if (all) {
+    apart_.clear();
     blocks_.share_out(blocks_.root(), blocks_.root(), is_far, near);
   } else {
-    for (const Apart& apart : apart_)
-      if (apart.left >= came(apart.one.number, apart.other.number) + spare)
-        still_apart_.push_back(apart);
-      else
-        blocks_.share_out(apart.one, apart.other, is_far, near);
+    reopened_.clear();
+    for (auto k = closer.rbegin(); k != closer.rend(); ++k) {
+      reopened_.push_back(std::exchange(apart_[*k], apart_.back()));
+      apart_.pop_back();
+    }
+    for (const Apart& apart : reopened_) blocks_.share_out(apart.one, apart.other, is_far, near);
   }
-  std::swap(apart_, still_apart_);
   std::sort(met.begin(), met.end());
   if (all || !met.empty()) add(met, all);
   if (all) met_ = apart_.size() + states_.size();
@@ -179,9 +222,10 @@ void PairLists::place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at
 
 // By how much distances within both blocks have changed since their list was made, at most, m: by
 // no more than what each particle moved by beside a rotation of all lies within.
-double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List& list) {
-  place(x, blocks, now_);
-  const Eigen::Index last = now_.cols() - 1, half = last / 2;
+double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List& list,
+                         Matrix3Xd& now) {
+  place(x, blocks, now);
+  const Eigen::Index last = now.cols() - 1, half = last / 2;
   // any that turns with the cloth
   const auto frame = [&](const Matrix3Xd& at) -> Eigen::Matrix3d {
     constexpr double kOnALine = 1e-3;  // sine
@@ -193,11 +237,11 @@ double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List
     axes.col(1) = axes.col(2).cross(axes.col(0));
     return axes;
   };
-  const Eigen::Matrix3d turn = frame(now_) * frame(list.made_at).transpose();
+  const Eigen::Matrix3d turn = frame(now) * frame(list.made_at).transpose();
   Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()),
                  high = -low;
   for (Eigen::Index k = 0; k <= last; ++k) {
-    const Eigen::Array3d by = (now_.col(k) - turn * list.made_at.col(k)).array();
+    const Eigen::Array3d by = (now.col(k) - turn * list.made_at.col(k)).array();
     low = low.min(by);
     high = high.max(by);
   }
@@ -232,8 +276,9 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
   for (; known < old_states.size(); ++known) keep();
 }
 
-void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& state, List& list) {
-  if (list.made_at.cols() > 0) state.left = list.reach - change(x, state.blocks, list);
+void PairLists::renew(const Matrix3Xd& x, double least, double reach, Scratch& scratch,
+                      State& state, List& list) {
+  if (list.made_at.cols() > 0) state.left = list.reach - change(x, state.blocks, list, scratch.now);
   if (state.left >= least) return;
   constexpr int kMostBent = 7;
   list = {};
@@ -251,7 +296,8 @@ void PairLists::renew(const Matrix3Xd& x, double least, double reach, State& sta
   if (state.left >= least) return;
   state.left = list.reach = reach;
   place(x, state.blocks, list.made_at);
-  list.all = candidates_of(cloth_, find_pairs(cloth_, blocks_, state.blocks, x, reach));
+  list.all =
+      candidates_of(cloth_, find_pairs(cloth_, blocks_, state.blocks, x, reach, scratch.search));
   state.has_some = !list.all.empty();
 }
 

@@ -24,13 +24,13 @@ class PairLists {
   // Cloth was at `from` when a window began, and came to where it is now, (3 x particles) m. Has
   // the lists hold every pair that was nearer than its thickness and what its blocks have come
   // since, or kMostMotion.
-  void update(const Matrix3Xd& from, const Matrix3Xd& now);
+  void update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& pool = calling_thread());
   // The same for a window that begins at `from`, in which nothing will come farther in relation to
   // anything else than `come`, m.
-  void expect(const Matrix3Xd& from, double come);
+  void expect(const Matrix3Xd& from, double come, ThreadPool& pool = calling_thread());
   // While they are empty: cloth that was at the last `from` is now about here. Looks only whether
   // it may come as far as `come` from here on, m.
-  void look(const Places& now, double come);
+  void look(const Places& now, double come, ThreadPool& pool = calling_thread());
   // How far particles may come in relation to each other, from the last `from` or place looked at
   // on, until lists do not hold any more, m.
   double lasts() const { return lasts_; }
@@ -67,11 +67,17 @@ class PairLists {
     NearBlocks::Node one, other;
     double left;  // until they may be near, m
   };
+  // What looking closer uses, of each share of it.
+  struct Scratch {
+    NearBlocks::Search search;
+    Matrix3Xd now;
+    Candidates near;
+  };
 
   template <class Came>
-  void look(const Matrix3Xd& x, const Came& came, double spare);
+  void look(const Matrix3Xd& x, const Came& came, double spare, ThreadPool& pool);
   template <class Came>
-  void meet(const Came& came, double spare);
+  void meet(const Came& came, double spare, const std::vector<std::size_t>& closer);
   void add(const std::vector<BlockPair>& met, bool only);
   double least_left(double come) const;
   double length(double came) const;  // no more than kMostMotion
@@ -79,8 +85,10 @@ class PairLists {
   void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
   double left_at(const Matrix3Xd& x, const State& state, const List& list, double left,
                  double enough);
-  double change(const Matrix3Xd& x, const BlockPair& blocks, const List& list);
-  void renew(const Matrix3Xd& x, double least, double reach, State& state, List& list);
+  double change(const Matrix3Xd& x, const BlockPair& blocks, const List& list, Matrix3Xd& now);
+  void look_closer(const Matrix3Xd& x, double spare, Scratch& scratch, State& state, List& list);
+  void renew(const Matrix3Xd& x, double least, double reach, Scratch& scratch, State& state,
+             List& list);
   static void prune(const Matrix3Xd& x, double reach, State& state, List& list);
 
   const Cloth& cloth_;
@@ -88,15 +96,15 @@ class PairLists {
   Matrix3Xd before_;     // where the window of the last update began, m; or empty
   Places before_about_;  // the same
   double lasts_ = -1;    // m
-  std::vector<Apart> apart_, still_apart_;
+  std::vector<Apart> apart_, reopened_;
   std::size_t met_ = 0;                       // of them and of states, when all were looked for
   int looks_ = 0;                             // since then
   std::vector<State> states_;                 // in ascending order of blocks
   std::vector<std::unique_ptr<List>> lists_;  // of these
   std::size_t near_ = 0;                      // lists that have some
   BlockMotion since_, in_window_;
-  Matrix3Xd now_, now_all_;
-  Candidates some_near_;
+  Matrix3Xd now_all_;
+  std::vector<Scratch> scratch_ = std::vector<Scratch>(1);
 };
 
 }  // namespace weft

@@ -169,16 +169,16 @@ std::map<BlockPair, ClothPairs> all_pairs(const Cloth& cloth) {
 }
 
 ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
-                      const Matrix3Xd& x, double reach) {
+                      const Matrix3Xd& x, double reach, NearBlocks::Search& search) {
   ClothPairs some, found;
   const double boxes_within = cloth.thickest + reach;
   const auto add_corners = [&](int one, int other) {
-    for (const ClothPair& pair : near.near_corners(one, other, boxes_within))
+    for (const ClothPair& pair : near.near_corners(one, other, boxes_within, search))
       if (!has(corners_of(cloth, pair.second), pair.first)) some.corners.push_back(pair);
   };
   add_corners(blocks.one, blocks.other);
   if (blocks.one != blocks.other) add_corners(blocks.other, blocks.one);
-  for (const ClothPair& pair : near.near_edges(blocks, boxes_within))
+  for (const ClothPair& pair : near.near_edges(blocks, boxes_within, search))
     if (!share_end(ends_of(cloth, pair.first), ends_of(cloth, pair.second)))
       some.edges.push_back(pair);
   for_each_distance(

@@ -49,6 +49,6 @@ std::map<BlockPair, ClothPairs> all_pairs(const Cloth& cloth);
 // Those between two blocks, at x where `near` has its boxes, that are nearer to each other than
 // their thickness and `reach`, m.
 ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
-                      const Matrix3Xd& x, double reach);
+                      const Matrix3Xd& x, double reach, NearBlocks::Search& search);
 
 }  // namespace weft

@@ -15,6 +15,7 @@ namespace {
 constexpr int kMostPasses = 12;
 // of thickness: what others need not answer; the next window begins with what was given in this one
 constexpr double kSmall = 1e-4;
+constexpr int kElsewhere = -1;
 constexpr double kDepthShare = 0.2;  // of its depth that a pair is moved apart
 
 std::size_t hash(const std::array<int, 4>& particle) {
@@ -25,16 +26,35 @@ std::size_t hash(const std::array<int, 4>& particle) {
 
 }  // namespace
 
-void Separation::touch(std::span<const NearCloth> near, const Untangling& untangling,
-                       const Matrix3Xd& x, std::span<const double> inverse_mass,
-                       std::span<const Mover> movers, double most) {
-  contacts_.clear();
-  most_steps_ = std::numeric_limits<double>::infinity();
-  const Surroundings around{untangling, x, inverse_mass, movers, most};
-  for (const bool edges : {false, true}) touch(edges, near, around);
+Mover Separation::Ways::of(int particle) const {
+  Mover mover;
+  mover.way << to.col(particle) - from.col(particle), 0;
+  mover.in_step << in_step.col(particle), 0;
+  return mover;
 }
 
-void Separation::touch(bool edges, std::span<const NearCloth> near, const Surroundings& around) {
+void Separation::touch(std::span<const NearCloth> near, const Untangling& untangling,
+                       const Ways& ways, double most, ThreadPool& pool) {
+  constexpr std::int64_t kLeastShare = 64;  // lists, of a thread
+  const Surroundings around{untangling, ways, most};
+  const std::size_t shares = shares_of(pool, std::ssize(near), kLeastShare);
+  found_.resize(2 * shares);
+  const auto touch_share = [&](int part) {
+    const bool edges = static_cast<std::size_t>(part) >= shares;
+    const auto share = static_cast<std::size_t>(part) - (edges ? shares : 0);
+    const std::size_t begin = near.size() * share / shares,
+                      end = near.size() * (share + 1) / shares;
+    touch(edges, near.subspan(begin, end - begin), around, found_[static_cast<std::size_t>(part)]);
+  };
+  pool.run(static_cast<int>(2 * shares), touch_share);
+  most_steps_ = std::numeric_limits<double>::infinity();
+  for (const Found& found : found_) most_steps_ = std::min(most_steps_, found.most_steps);
+}
+
+void Separation::touch(bool edges, std::span<const NearCloth> near, const Surroundings& around,
+                       Found& found) {
+  found.contacts.clear();
+  found.most_steps = std::numeric_limits<double>::infinity();
   struct Waiting {
     const Candidate* candidate;
     double within, friction;
@@ -51,7 +71,7 @@ void Separation::touch(bool edges, std::span<const NearCloth> near, const Surrou
       const auto& [candidate, within, friction] = waiting[n];
       if (squared < within * within && squared > 0)
         add(edges, *candidate, batch.weights(n), batch.apart(n), std::sqrt(squared), friction,
-            around);
+            around, found);
     }
     batch.clear();
   };
@@ -67,7 +87,8 @@ void Separation::touch(bool edges, std::span<const NearCloth> near, const Surrou
     for (const Candidate& candidate : of_kind(n)) {
       const auto& [i, j, k, l] = candidate.particle;
       waiting[batch.size()] = {&candidate, candidate.thickness + cloth.come, cloth.friction};
-      batch.add(around.x.col(i), around.x.col(j), around.x.col(k), around.x.col(l));
+      const Matrix3Xd& x = around.ways.from;
+      batch.add(x.col(i), x.col(j), x.col(k), x.col(l));
       if (batch.full()) solve();
     }
   }
@@ -78,19 +99,18 @@ void Separation::touch(bool edges, std::span<const NearCloth> near, const Surrou
 // other.
 void Separation::add(bool edges, const Candidate& candidate, const std::array<double, 4>& weight,
                      const Vector3d& apart, double distance, double friction,
-                     const Surroundings& around) {
+                     const Surroundings& around, Found& found) {
   constexpr double kLeastReach = 0.02;  // of the thickness, where things nearly touch
   constexpr double kLeastMoves = 0.01;  // of its lightest particle's 1 / mass
-  const auto mover = [&](std::size_t n) -> const Mover& {
-    return around.movers[static_cast<std::size_t>(candidate.particle[n])];
-  };
+  std::array<Mover, 4> movers;
+  for (std::size_t n = 0; n < 4; ++n) movers[n] = around.ways.of(candidate.particle[n]);
   // of all of the one to all of the other, m^2
   const auto farthest = [&](Eigen::Vector4d Mover::*motion) {
     double most = 0;
     const std::size_t ends = edges ? 2 : 1;
     for (std::size_t m = 0; m < ends; ++m)
       for (std::size_t n = ends; n < 4; ++n)
-        most = std::max(most, (mover(m).*motion - mover(n).*motion).squaredNorm());
+        most = std::max(most, (movers[m].*motion - movers[n].*motion).squaredNorm());
     return most;
   };
   const double room = distance - candidate.thickness;
@@ -100,7 +120,8 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   std::array<double, 4> share;
   double moves = 0, lightest = 0;  // 1/kg, of what the pair moves
   for (std::size_t n = 0; n < 4; ++n) {
-    const double inverse = around.inverse_mass[static_cast<std::size_t>(candidate.particle[n])];
+    const double inverse =
+        around.ways.inverse_mass[static_cast<std::size_t>(candidate.particle[n])];
     share[n] = weight[n] * inverse;
     moves += weight[n] * share[n];
     lightest = std::max(lightest, inverse);
@@ -111,9 +132,9 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   const double reach =
       std::max(std::min(distance / 2, candidate.thickness / 4), kLeastReach * candidate.thickness);
   const double in_step = farthest(&Mover::in_step);
-  if (in_step * most_steps_ * most_steps_ > reach * reach) most_steps_ = reach / std::sqrt(in_step);
+  if (in_step > 0) found.most_steps = std::min(found.most_steps, reach / std::sqrt(in_step));
 
-  Contact& contact = contacts_.emplace_back();
+  Contact& contact = found.contacts.emplace_back();
   contact.particle = candidate.particle;
   contact.edges = edges;
   contact.weight = weight;
@@ -124,13 +145,31 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   contact.friction = friction;
 }
 
+// Has the particles of all contacts begin with their own ways.
+void Separation::set_out(const Ways& ways) {
+  movers_.resize(ways.inverse_mass.size());
+  changed_.resize(movers_.size(), kElsewhere);
+  for (const int i : particles_) changed_[static_cast<std::size_t>(i)] = kElsewhere;
+  particles_.clear();
+  for_each_contact([&](const Contact& contact) {
+    for (const int i : contact.particle) {
+      const auto at = static_cast<std::size_t>(i);
+      if (changed_[at] != kElsewhere) continue;
+      changed_[at] = 0;
+      movers_[at] = ways.of(i);
+      particles_.push_back(i);
+    }
+  });
+}
+
 // Those are looked at again whose particles others have moved.
-void Separation::separate(double steps, std::span<Mover> movers) {
+void Separation::separate(double steps, const Ways& ways) {
+  set_out(ways);
   // what was given the last time
   std::size_t next = 0;  // most pairs come in the order in which they came then
-  for (Contact& contact : contacts_) {
+  for_each_contact([&](Contact& contact) {
     const std::size_t found = find_given(contact, next);
-    if (found == given_.size()) continue;
+    if (found == given_.size()) return;
     next = found + 1;
     const Eigen::Vector4d& normal = contact.normal;
     const auto turned = [&](const Change& change) -> Change {
@@ -141,27 +180,26 @@ void Separation::separate(double steps, std::span<Mover> movers) {
     const Eigen::Vector4d way = contact.way.along * normal + contact.way.sliding,
                           in_step = contact.in_step.along * normal + contact.in_step.sliding;
     for (std::size_t n = 0; n < 4; ++n) {
-      Mover& mover = movers[static_cast<std::size_t>(contact.particle[n])];
+      Mover& mover = movers_[static_cast<std::size_t>(contact.particle[n])];
       mover.way += contact.share[n] * way;
       mover.in_step += contact.share[n] * in_step;
     }
-  }
+  });
 
-  changed_.assign(movers.size(), 0);
   int now = 0;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const int before = now;
-    for (Contact& contact : contacts_) {
+    for_each_contact([&](Contact& contact) {
       int changed = 0;
       for (const int i : contact.particle)
         changed = std::max(changed, changed_[static_cast<std::size_t>(i)]);
-      if (changed <= contact.looked_at) continue;
-      if (separate(steps, contact, movers) > kSmall * contact.thickness) {
+      if (changed <= contact.looked_at) return;
+      if (separate(steps, contact) > kSmall * contact.thickness) {
         ++now;
         for (const int i : contact.particle) changed_[static_cast<std::size_t>(i)] = now;
       }
       contact.looked_at = now;
-    }
+    });
     if (now == before) break;
   }
   keep_given();
@@ -182,9 +220,9 @@ Eigen::Vector4d Separation::give(const Eigen::Vector4d& motion, const Eigen::Vec
 }
 
 // Returns how far it was from what it is to be, m.
-double Separation::separate(double steps, Contact& contact, std::span<Mover> movers) {
+double Separation::separate(double steps, Contact& contact) {
   const auto mover = [&](std::size_t n) -> Mover& {
-    return movers[static_cast<std::size_t>(contact.particle[n])];
+    return movers_[static_cast<std::size_t>(contact.particle[n])];
   };
   Eigen::Vector4d way = Eigen::Vector4d::Zero(), in_step = Eigen::Vector4d::Zero();
   for (std::size_t n = 0; n < 4; ++n) {
@@ -221,9 +259,10 @@ void Separation::forget_given() {
 
 void Separation::keep_given() {
   given_.clear();
-  for (const Contact& contact : contacts_)
+  for_each_contact([&](const Contact& contact) {
     if (contact.way.along > 0 || contact.in_step.along > 0)
       given_.push_back({contact.particle, contact.edges, contact.way, contact.in_step});
+  });
   place_.assign(std::bit_ceil(2 * given_.size() + 1), 0);
   for (std::size_t k = 0; k < given_.size(); ++k) {
     std::size_t at = hash(given_[k].particle);

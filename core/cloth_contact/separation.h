@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -7,6 +8,7 @@
 
 #include "core/cloth_contact/pairs.h"
 #include "core/cloth_contact/untangling.h"
+#include "core/motion/thread_pool.h"
 
 namespace weft {
 
@@ -35,17 +37,29 @@ struct NearCloth {
 // last time, which in cloth that lies still is what they will give.
 class Separation {
  public:
+  // Where particles set out, where they are now, and their displacement in the last step, (3 x
+  // particles) m; 1/kg.
+  struct Ways {
+    const Matrix3Xd &from, &to, &in_step;
+    std::span<const double> inverse_mass;
+
+    Mover of(int particle) const;
+  };
   // Finds the candidates that may have come nearer than their thickness on their way, as far as
   // they came less far than `most` (m) in relation to each other, without those that are led apart.
-  // x: where movers set out, (3 x movers) m; 1/kg.
-  void touch(std::span<const NearCloth> near, const Untangling& untangling, const Matrix3Xd& x,
-             std::span<const double> inverse_mass, std::span<const Mover> movers, double most);
-  bool empty() const { return contacts_.empty(); }
+  void touch(std::span<const NearCloth> near, const Untangling& untangling, const Ways& ways,
+             double most, ThreadPool& pool);
+  bool empty() const {
+    return std::ranges::all_of(found_, [](const Found& found) { return found.contacts.empty(); });
+  }
   // In how many steps like the last none of those found comes nearer by more than half its
   // distance, nor slides that far.
   double most_steps() const { return most_steps_; }
   // Of as many steps as are to come until contact acts again.
-  void separate(double steps, std::span<Mover> movers);
+  void separate(double steps, const Ways& ways);
+  // Particles of those found, and where separate() had them move.
+  std::span<const int> particles() const { return particles_; }
+  const Mover& mover(int particle) const { return movers_[static_cast<std::size_t>(particle)]; }
   // Has pairs begin with nothing the next time.
   void forget_given();
 
@@ -74,25 +88,36 @@ class Separation {
   };
   struct Surroundings {
     const Untangling& untangling;
-    const Matrix3Xd& x;
-    std::span<const double> inverse_mass;
-    std::span<const Mover> movers;
+    const Ways& ways;
     double most;
   };
+  struct Found {
+    std::vector<Contact> contacts;
+    double most_steps = 0;
+  };
 
-  void touch(bool edges, std::span<const NearCloth> near, const Surroundings& around);
-  void add(bool edges, const Candidate& candidate, const std::array<double, 4>& weight,
-           const Vector3d& apart, double distance, double friction, const Surroundings& around);
+  static void touch(bool edges, std::span<const NearCloth> near, const Surroundings& around,
+                    Found& found);
+  static void add(bool edges, const Candidate& candidate, const std::array<double, 4>& weight,
+                  const Vector3d& apart, double distance, double friction,
+                  const Surroundings& around, Found& found);
+  void set_out(const Ways& ways);
+  template <class F>
+  void for_each_contact(const F& f) {
+    for (Found& found : found_) std::ranges::for_each(found.contacts, f);
+  }
   static Eigen::Vector4d give(const Eigen::Vector4d& motion, const Eigen::Vector4d& normal,
                               double least, double friction, double free, Change& given);
-  static double separate(double steps, Contact& contact, std::span<Mover> movers);
+  double separate(double steps, Contact& contact);
   std::size_t find_given(const Contact& contact, std::size_t next) const;
   void keep_given();
 
-  std::vector<Contact> contacts_;
   std::vector<Given> given_;          // the last time, of pairs that gave something
   std::vector<std::uint32_t> place_;  // in given_ and one more, by hash of the pair; 0: none
-  std::vector<int> changed_;          // when, of each mover
+  std::vector<Found> found_;          // in their order: corners in shares, edges in shares
+  std::vector<int> particles_;
+  std::vector<Mover> movers_;  // of particles_; of others as they were
+  std::vector<int> changed_;   // when, the same; others: kElsewhere
   double most_steps_ = 0;
 };
 

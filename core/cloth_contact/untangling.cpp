@@ -5,8 +5,6 @@
 #include <cmath>
 #include <initializer_list>
 
-#include "core/cloth_contact/cuts.h"
-
 namespace weft {
 
 double Untangling::speed_at(double time) {
@@ -19,9 +17,8 @@ void Untangling::clear() {
   at_cut_.clear();
 }
 
-void Untangling::find(NearBlocks& near, const Matrix3Xd& x, double speed) {
+void Untangling::set(const std::vector<ClothPair>& cuts, const Matrix3Xd& x, double speed) {
   clear();
-  const std::vector<ClothPair> cuts = find_cuts(cloth_, near, x);
   if (cuts.empty()) return;
   Around around(static_cast<std::size_t>(cloth_.particles()));
   for (std::size_t t = 0; t < cloth_.triangles.size(); ++t)

@@ -21,9 +21,8 @@ class Untangling {
 
   explicit Untangling(const Cloth& cloth) : cloth_(cloth) {}
 
-  // Looks for cuts at x, (3 x particles) m, where `near` has its boxes. They are led apart at up to
-  // `speed`, m/s.
-  void find(NearBlocks& near, const Matrix3Xd& x, double speed);
+  // These cuts of cloth at x, (3 x particles) m, are led apart at up to `speed`, m/s.
+  void set(const std::vector<ClothPair>& cuts, const Matrix3Xd& x, double speed);
   void clear();
   bool empty() const { return pairs_.empty(); }
   // Whether all of these particles are at cuts: what they are to keep apart may be on wrong sides.

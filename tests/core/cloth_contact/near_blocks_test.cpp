@@ -68,9 +68,10 @@ TEST(NearBlocks, HaveEveryPairWithinReach) {
         }
         std::vector<ClothPairs> found;
         near.set(x);
+        NearBlocks::Search search;
         for (const BlockPair& blocks : near.meet(thickest + reach)) {
           if (near.distance(blocks) > thickest + reach) continue;
-          const ClothPairs some = find_pairs(cloth, near, blocks, x, reach);
+          const ClothPairs some = find_pairs(cloth, near, blocks, x, reach, search);
           if (!some.empty()) found.push_back(some);
         }
         EXPECT_TRUE(found == expected) << size(found) << " of " << size(expected);

@@ -168,7 +168,7 @@ std::vector<bool> freed_at(double time, const Scene& scene) {
   NearBlocks near(cloth);
   near.set(x);
   Untangling untangling(cloth);
-  untangling.find(near, x, Untangling::speed_at(time));
+  untangling.set(find_cuts(cloth, near, x), x, Untangling::speed_at(time));
   std::vector<bool> freed;
   for (int i = 0; i < cloth.particles(); ++i) freed.push_back(untangling.has({i, i, i, i}));
   return freed;

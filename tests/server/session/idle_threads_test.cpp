@@ -89,14 +89,7 @@ TEST(IdleThreads, LeavesForATaskWhoseTimeHasCome) {
   done.get_future().wait();
 }
 
-// Hung over a ball: parts of a step write beside each other, in contact as well.
-void expect_same_frames_by_many_threads(SheetDefinition sheet) {
-  sheet.pins = {{{0, 129}, {}}};
-  Scene scene = floating(sheet);
-  scene.environment.gravity = {0, -9.8, 0};
-  scene.solver.frame_step = 2e-4;
-  const Vector3d middle = start_positions(sheet).rowwise().mean();
-  scene.colliders = {{"ball", Sphere{middle - Vector3d(0, 0.1, 0), 0.1}, 0.3, {}}};
+void expect_same_frames_by_many_threads(const Scene& scene) {
   Simulation alone(scene);
   ASSERT_GT(alone.most_threads(), 1);
 
@@ -112,8 +105,19 @@ void expect_same_frames_by_many_threads(SheetDefinition sheet) {
   }
 }
 
+// Parts of a step write beside each other, in contact as well.
+Scene hung_over_ball(SheetDefinition sheet) {
+  sheet.pins = {{{0, 129}, {}}};
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.solver.frame_step = 2e-4;
+  const Vector3d middle = start_positions(sheet).rowwise().mean();
+  scene.colliders = {{"ball", Sphere{middle - Vector3d(0, 0.1, 0), 0.1}, 0.3, {}}};
+  return scene;
+}
+
 TEST(IdleThreads, DoNotChangeTheFramesOfALargeGrid) {
-  expect_same_frames_by_many_threads(flat_sheet(64, 130));
+  expect_same_frames_by_many_threads(hung_over_ball(flat_sheet(64, 130)));
 }
 
 TEST(IdleThreads, DoNotChangeTheFramesOfManyTriangles) {
@@ -121,7 +125,26 @@ TEST(IdleThreads, DoNotChangeTheFramesOfManyTriangles) {
   sheet.shape = complete(triangle_mesh(square(Cut::kAlternating, 1, 1.0 / 90)));
   sheet.textile.model = light_textile(0.15);
   sheet.bending = Isometric{};
-  expect_same_frames_by_many_threads(sheet);
+  expect_same_frames_by_many_threads(hung_over_ball(sheet));
+}
+
+// They meet everywhere, some of them through each other.
+TEST(IdleThreads, DoNotChangeTheFramesOfSheetsInContact) {
+  SheetDefinition below = flat_sheet(2, 2);
+  below.name = "below";
+  below.shape = complete(triangle_mesh(square(Cut::kAlternating, 1, 1.0 / 70)));
+  below.textile.model = light_textile(0.15);
+  below.bending = Isometric{};
+  SheetDefinition above = below;
+  above.name = "above";
+  above.origin.y() += 0.002;
+  above.rotation = Eigen::AngleAxisd(0.02, Vector3d::UnitZ());
+  Scene scene = floating(below);
+  scene.sheets.push_back(above);
+  scene.cloth_contact = true;
+  scene.untangle = 1;
+  scene.solver.frame_step = 1e-3;
+  expect_same_frames_by_many_threads(scene);
 }
 
 }  // namespace

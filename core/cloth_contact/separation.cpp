@@ -26,13 +26,6 @@ std::size_t hash(const std::array<int, 4>& particle) {
 
 }  // namespace
 
-Mover Separation::Ways::of(int particle) const {
-  Mover mover;
-  mover.way << to.col(particle) - from.col(particle), 0;
-  mover.in_step << in_step.col(particle), 0;
-  return mover;
-}
-
 void Separation::touch(std::span<const NearCloth> near, const Untangling& untangling,
                        const Ways& ways, double most, ThreadPool& pool) {
   constexpr std::int64_t kLeastShare = 64;  // lists, of a thread
@@ -102,19 +95,18 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
                      const Surroundings& around, Found& found) {
   constexpr double kLeastReach = 0.02;  // of the thickness, where things nearly touch
   constexpr double kLeastMoves = 0.01;  // of its lightest particle's 1 / mass
-  std::array<Mover, 4> movers;
-  for (std::size_t n = 0; n < 4; ++n) movers[n] = around.ways.of(candidate.particle[n]);
   // of all of the one to all of the other, m^2
-  const auto farthest = [&](Eigen::Vector4d Mover::*motion) {
+  const auto farthest = [&](Eigen::Vector4d (Ways::*motion)(int) const) {
+    std::array<Eigen::Vector4d, 4> by;
+    for (std::size_t n = 0; n < 4; ++n) by[n] = (around.ways.*motion)(candidate.particle[n]);
     double most = 0;
     const std::size_t ends = edges ? 2 : 1;
     for (std::size_t m = 0; m < ends; ++m)
-      for (std::size_t n = ends; n < 4; ++n)
-        most = std::max(most, (movers[m].*motion - movers[n].*motion).squaredNorm());
+      for (std::size_t n = ends; n < 4; ++n) most = std::max(most, (by[m] - by[n]).squaredNorm());
     return most;
   };
   const double room = distance - candidate.thickness;
-  if (room >= around.most || (room > 0 && room * room >= farthest(&Mover::way))) return;
+  if (room >= around.most || (room > 0 && room * room >= farthest(&Ways::way))) return;
   if (!around.untangling.empty() && around.untangling.has(candidate.particle)) return;
 
   std::array<double, 4> share;
@@ -131,7 +123,7 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   for (double& part : share) part /= moves;
   const double reach =
       std::max(std::min(distance / 2, candidate.thickness / 4), kLeastReach * candidate.thickness);
-  const double in_step = farthest(&Mover::in_step);
+  const double in_step = farthest(&Ways::last);
   if (in_step > 0) found.most_steps = std::min(found.most_steps, reach / std::sqrt(in_step));
 
   Contact& contact = found.contacts.emplace_back();
@@ -156,7 +148,7 @@ void Separation::set_out(const Ways& ways) {
       const auto at = static_cast<std::size_t>(i);
       if (changed_[at] != kElsewhere) continue;
       changed_[at] = 0;
-      movers_[at] = ways.of(i);
+      movers_[at] = {ways.way(i), ways.last(i)};
       particles_.push_back(i);
     }
   });

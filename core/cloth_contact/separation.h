@@ -43,7 +43,16 @@ class Separation {
     const Matrix3Xd &from, &to, &in_step;
     std::span<const double> inverse_mass;
 
-    Mover of(int particle) const;
+    Eigen::Vector4d way(int particle) const {
+      Eigen::Vector4d way;
+      way << to.col(particle) - from.col(particle), 0;
+      return way;
+    }
+    Eigen::Vector4d last(int particle) const {
+      Eigen::Vector4d last;
+      last << in_step.col(particle), 0;
+      return last;
+    }
   };
   // Finds the candidates that may have come nearer than their thickness on their way, as far as
   // they came less far than `most` (m) in relation to each other, without those that are led apart.

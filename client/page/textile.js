@@ -24,6 +24,7 @@ const kBoth = [
 ];
 const kNeverNone = ['areal_density_kg_per_m2', 'particle_mass_kg'];
 const kSteps = 1000;
+const kChosen = 'auto';  // where a textile leaves a value to the server
 
 // A number as one would write it, with three digits.
 const short = (value) => String(Number(value.toPrecision(3)));
@@ -84,15 +85,15 @@ class TextilePanel {
     const value = values[name];
     const path = prefix + name;
     const {valueAt, placeOf} = scaleOf(
-      low, Math.max(high, value), !kNeverNone.includes(name));
+      low, Math.max(high, value ?? 0), !kNeverNone.includes(name));
     const made = document.createElement('div');
     made.className = 'slider';
     const range = cell('input', '', {type: 'range', min: 0, max: kSteps, step: 1, 'aria-label': label, 'data-field': name});
-    const number = cell('input', '', {class: 'number', inputmode: 'decimal', size: 7, 'aria-label': `${label}, ${unit || 'number'}`});
+    const number = cell('input', '', {class: 'number', inputmode: 'decimal', size: 7, placeholder: kChosen, 'aria-label': `${label}, ${unit || 'number'}`});
     const set = (to) => {
-      range.value = placeOf(to);
-      number.value = short(to * scale);
-      range.setAttribute('aria-valuetext', `${number.value} ${unit}`);
+      range.value = to === undefined ? 0 : placeOf(to);
+      number.value = to === undefined ? '' : short(to * scale);
+      range.setAttribute('aria-valuetext', to === undefined ? kChosen : `${number.value} ${unit}`);
     };
     set(value);
     range.addEventListener('input', () => {
@@ -137,9 +138,9 @@ class TextilePanel {
   // A preset; damping and friction stay.
   async take(preset) {
     if (!preset) return;
-    const {damping_kg_per_s, friction_coefficient} = this.sheet.textile;
+    const {damping_kg_per_s, damping_ratio, friction_coefficient} = this.sheet.textile;
     const chosen = $('preset').selectedOptions[0].textContent;
-    if (await this.send({preset, damping_kg_per_s, friction_coefficient}, [], chosen)) this.fill();
+    if (await this.send({preset, damping_kg_per_s, damping_ratio, friction_coefficient}, [], chosen)) this.fill();
     $('preset').value = '';
   }
 

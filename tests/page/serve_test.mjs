@@ -239,6 +239,9 @@ test('a slider leads a body through its poses, and it is drawn where it is', asy
   const {page, close} = await open('lid');
   assert.equal(await page.locator('#posed').isVisible(), true);
   await says(page, 'poses', /lid10\.00 s/);
+  const damping = page.getByLabel('Damping, g/s');
+  assert.equal(await damping.inputValue(), '', 'its textile leaves that to the server');
+  assert.equal(await damping.getAttribute('placeholder'), 'auto');
   await page.getByLabel('Pose of lid').fill('10.5');
   await says(page, 'doing', /Leads lid from frame 1 on, when it runs/);
   await play(page);

@@ -50,10 +50,10 @@ Vector3d direction_of(const Vector3d& vector, const Vector3d& otherwise) {
   return length > 0 ? Vector3d(vector / length) : otherwise;
 }
 
-Solid solid_of(const v1::MeshData& mesh, const Vector3d& offset, double time_s) {
+Solid solid_of(const v1::MeshData& mesh, const Vector3d& offset, double pose_time_s) {
   Solid solid;
   solid.offset = offset;
-  const std::vector<float> planes = positions_at(mesh, time_s);
+  const std::vector<float> planes = positions_at(mesh, pose_time_s);
   const std::size_t count = planes.size() / 3;
   const auto plane = [&](std::size_t axis) {
     const auto first = planes.begin() + static_cast<std::ptrdiff_t>(axis * count);
@@ -69,7 +69,8 @@ Solid solid_of(const v1::MeshData& mesh, const Vector3d& offset, double time_s) 
   return solid;
 }
 
-Body body_of(const v1::Collider& collider, const Vector3d& offset, double time_s) {
+// pose_time_s: among the times of its poses.
+Body body_of(const v1::Collider& collider, const Vector3d& offset, double pose_time_s) {
   switch (collider.shape_case()) {
     case v1::Collider::kSphere:
       return Ball{vector_of(collider.sphere().center_m()) + offset, collider.sphere().radius_m()};
@@ -84,7 +85,7 @@ Body body_of(const v1::Collider& collider, const Vector3d& offset, double time_s
                     rotation_of(box)};
     }
     case v1::Collider::kMesh:
-      return solid_of(collider.mesh().data(), offset, time_s);
+      return solid_of(collider.mesh().data(), offset, pose_time_s);
     default: {
       const v1::Plane& plane = collider.plane();
       return HalfSpace{vector_of(plane.point_m()) + offset,
@@ -139,10 +140,15 @@ Way way_from(const HalfSpace& space, const Vector3d& place, double /*rounding*/)
 
 }  // namespace
 
-std::vector<Body> bodies_at(const v1::Scene& scene, double time_s) {
+std::vector<Body> bodies_at(const v1::Scene& scene, double time_s,
+                            const std::vector<double>& pose_times_s) {
   std::vector<Body> bodies;
-  for (const auto& collider : scene.colliders())
-    bodies.push_back(body_of(collider, offset_at(collider.path(), time_s), time_s));
+  auto led = pose_times_s.begin();
+  for (const auto& collider : scene.colliders()) {
+    const bool is_led = collider.mesh().data().has_poses() && led != pose_times_s.end();
+    bodies.push_back(
+        body_of(collider, offset_at(collider.path(), time_s), is_led ? *led++ : time_s));
+  }
   return bodies;
 }
 

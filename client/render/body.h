@@ -36,7 +36,9 @@ struct Solid {
 using Body = std::variant<Ball, Capsule, Cuboid, HalfSpace, Solid>;
 
 // The scene's colliders, moved along their paths; of triangles those whose mesh it holds.
-std::vector<Body> bodies_at(const v1::Scene& scene, double time_s);
+// pose_times_s: FrameStats.pose_times_s.
+std::vector<Body> bodies_at(const v1::Scene& scene, double time_s,
+                            const std::vector<double>& pose_times_s = {});
 
 // A way to the surface of a body, out of it or on to it.
 struct Way {

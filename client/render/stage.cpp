@@ -66,7 +66,9 @@ Stage read_stage(RecordingReader& recording, std::int64_t number, Colouring colo
   Stage stage;
   stage.frame = number;
   stage.time_s = frame.time_s();
-  stage.bodies = bodies_at(with_bodies(recording.scene(), recording.assets()), stage.time_s);
+  const auto& led = frame.stats().pose_times_s();
+  stage.bodies = bodies_at(with_bodies(recording.scene(), recording.assets()), stage.time_s,
+                           {led.begin(), led.end()});
   const int pieces = pieces_of(header);
   const std::vector<ClothMesh> meshes = cloth_of(recording);
   int panels = 0;

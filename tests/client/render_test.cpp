@@ -220,6 +220,25 @@ TEST_F(RenderTest, BodiesOfTrianglesAreSeenWhereTheyStand) {
   EXPECT_GT(with, blue_pixels(record(scene, "without")) + 75);
 }
 
+TEST(Bodies, StandInThePoseThatTheyWereLedTo) {
+  v1::Scene scene;
+  scene.add_colliders()->mutable_sphere()->set_radius_m(0.1);
+  v1::MeshData& cube = *scene.add_colliders()->mutable_mesh()->mutable_data();
+  cube = cube_mesh(0.1F, 0, 0, 0);
+  cube.mutable_poses()->add_times_s(10);
+  cube.mutable_poses()->add_times_s(11);
+  cube.mutable_poses()->set_positions_m(cube.positions_m() +
+                                        cube_mesh(0.1F, 0.8F, 0, 0).positions_m());
+  const auto moved_by = [&](const std::vector<double>& pose_times_s) {
+    const auto at = [&](double time_s, const std::vector<double>& led) {
+      return std::get<client::Solid>(client::bodies_at(scene, time_s, led)[1]).corners.x[0];
+    };
+    return at(0, pose_times_s) - at(0, {});
+  };
+  EXPECT_NEAR(moved_by({10.5}), 0.4, 1e-6);
+  EXPECT_NEAR(moved_by({11}), 0.8, 1e-6);
+}
+
 TEST_F(RenderTest, BodiesCastShadowsOnAPlane) {
   v1::Scene scene = standing_square();
   scene.mutable_sheets(0)->mutable_grid()->set_spacing_m(0.05);

@@ -234,14 +234,14 @@ function lid() {
 }
 
 test('a slider leads a body through its poses, and it is drawn where it is', async () => {
-  writeFileSync(file('lid.json'), JSON.stringify({...sewn(true), colliders: [lid()]}));
+  const {sheets: [sheet], ...rest} = sewn(true);
+  const cloth = {...sheet, textile: {...sheet.textile, damping_ratio: 0.01}};
+  const over = {...cloth, name: 'over', placement: {origin_m: {...sheet.placement.origin_m, y: 0.3}}};
+  writeFileSync(file('lid.json'), JSON.stringify({...rest, sheets: [cloth, over], colliders: [lid()]}));
   weft('session', 'create', file('lid.json'), '--id', 'lid');
   const {page, close} = await open('lid');
   assert.equal(await page.locator('#posed').isVisible(), true);
   await says(page, 'poses', /lid10\.00 s/);
-  const damping = page.getByLabel('Damping, g/s');
-  assert.equal(await damping.inputValue(), '', 'its textile leaves that to the server');
-  assert.equal(await damping.getAttribute('placeholder'), 'auto');
   await page.getByLabel('Pose of lid').fill('10.5');
   await says(page, 'doing', /Leads lid from frame 1 on, when it runs/);
   await play(page);
@@ -260,6 +260,28 @@ test('a slider leads a body through its poses, and it is drawn where it is', asy
   await settle(page);
   await picture(page, 'serve-poses-phone');
   await page.setViewportSize({width: 1280, height: 800});
+  const show = async (sheets) => {
+    await page.locator('#layers-button').click();
+    for (const name of ['cloth', 'over']) await page.locator('#layers').getByLabel(name).setChecked(sheets);
+    await page.keyboard.press('Escape');
+    await settle(page);
+  };
+  await show(false);
+  const body = await canvas(page);
+  await play(page);
+  await pass(page, 2);
+  await pause(page);
+  await settle(page);
+  assert.equal(await canvas(page), body, 'nothing leads it');
+  await page.getByLabel('Pose of lid').fill('10.8');
+  await play(page);
+  await says(page, 'poses', /lid10\.80 s/);
+  await pause(page);
+  await settle(page);
+  assert.notEqual(await canvas(page), body);
+  await show(true);
+  await page.getByRole('button', {name: 'Fit'}).click();
+  await settle(page);
   const drawn = await canvas(page);
   await page.getByRole('button', {name: 'Pattern'}).click();
   await settle(page);
@@ -267,6 +289,17 @@ test('a slider leads a body through its poses, and it is drawn where it is', asy
   await page.getByRole('button', {name: 'Pattern'}).click();
   await settle(page);
   assert.equal(await canvas(page), drawn);
+  await close();
+});
+
+test('damping that a textile leaves to the server is no number, and a preset keeps its ratio', async () => {
+  const {page, close} = await open('lid');
+  const damping = page.getByLabel('Damping, g/s');
+  assert.equal(await damping.inputValue(), '');
+  assert.equal(await damping.getAttribute('placeholder'), 'auto');
+  await page.locator('#preset').selectOption('textiles/denim_11oz');
+  await says(page, 'applied', /: from frame \d+ on/);
+  assert.equal(scene('lid').sheets[0].textile.damping_ratio, 0.01);
   await close();
 });
 

@@ -8,6 +8,22 @@
 #include "server/session/idle_threads.h"
 
 namespace weft {
+namespace {
+
+// Once one of them was led.
+std::vector<double> pose_times(const Scene& scene, double time) {
+  std::vector<double> times;
+  bool led = false;
+  for (const Collider& collider : scene.colliders) {
+    if (!collider.poses) continue;
+    const auto& own = collider.poses->times;
+    times.push_back(std::clamp(pose_time(collider, time), own.front(), own.back()));
+    led = led || collider.lead;
+  }
+  return led ? times : std::vector<double>();
+}
+
+}  // namespace
 
 Timeline::Timeline(Simulation given, std::int64_t max_frame_work, Duration snapshot_after)
     : simulation(std::move(given)),
@@ -62,23 +78,6 @@ bool Timeline::drop_frame() {
   frame_work_ = {};
   return true;
 }
-
-namespace {
-
-// Once one of them was led.
-std::vector<double> pose_times(const Scene& scene, double time) {
-  std::vector<double> times;
-  bool led = false;
-  for (const Collider& collider : scene.colliders) {
-    if (!collider.poses) continue;
-    const auto& own = collider.poses->times;
-    times.push_back(std::clamp(pose_time(collider, time), own.front(), own.back()));
-    led = led || collider.lead;
-  }
-  return led ? times : std::vector<double>();
-}
-
-}  // namespace
 
 std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs, bool read) const {
   auto frame = std::make_shared<Frame>();

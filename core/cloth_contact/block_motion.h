@@ -14,8 +14,8 @@ class BlockMotion {
   explicit BlockMotion(const NearBlocks& blocks);
 
   // (3 x particles) m
-  void set(const Matrix3Xd& from, const Matrix3Xd& to, ThreadPool& pool = calling_thread());
-  void set(const Places& from, const Places& to, ThreadPool& pool = calling_thread());
+  void set(const Matrix3Xd& from, const Matrix3Xd& to, ThreadPool& pool);
+  void set(const Places& from, const Places& to, ThreadPool& pool);
   void forget();
 
   // How far what is in two nodes, or blocks, moved in relation to each other, at most, m: what both

@@ -158,11 +158,18 @@ void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPoo
   write(sheets);
 }
 
-// At the begin of a frame, or at its end: the next one begins there.
-const std::vector<ClothPair>& ClothContact::find_cuts(std::span<const MovingSheet> sheets,
-                                                      Matrix3Xd& x, ThreadPool& pool) {
+// Of all sheets at the end of the last frame, m.
+Matrix3Xd ClothContact::good_positions(std::span<const MovingSheet> sheets) const {
+  Matrix3Xd x;
   cloth_.join([&](std::size_t s) -> const Matrix3Xd& { return sheets[s].good().x; }, x);
+  return x;
+}
+
+// There: asked for at its end, and when the next one begins.
+const std::vector<ClothPair>& ClothContact::find_cuts(std::span<const MovingSheet> sheets,
+                                                      ThreadPool& pool) {
   if (!cuts_) {
+    const Matrix3Xd x = good_positions(sheets);
     lists_.blocks().set(x, pool);
     cuts_ = weft::find_cuts(cloth_, lists_.blocks(), x, pool);
   }
@@ -172,17 +179,14 @@ const std::vector<ClothPair>& ClothContact::find_cuts(std::span<const MovingShee
 void ClothContact::untangle(std::span<const MovingSheet> sheets, double speed, ThreadPool& pool) {
   const bool was_empty = untangling_.empty();
   untangling_.clear();
-  if (speed > 0) {
-    Matrix3Xd x;
-    const std::vector<ClothPair>& cuts = find_cuts(sheets, x, pool);
-    untangling_.set(cuts, x, speed);
-  }
+  if (speed > 0)
+    if (const std::vector<ClothPair>& cuts = find_cuts(sheets, pool); !cuts.empty())
+      untangling_.set(cuts, good_positions(sheets), speed);
   if (!was_empty || !untangling_.empty()) forget();
 }
 
 std::int64_t ClothContact::count_cuts(std::span<const MovingSheet> sheets) {
-  Matrix3Xd x;
-  return std::ssize(find_cuts(sheets, x, calling_thread()));
+  return std::ssize(find_cuts(sheets, calling_thread()));
 }
 
 void ClothContact::read(std::span<MovingSheet> sheets, ThreadPool& pool) {

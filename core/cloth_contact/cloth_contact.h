@@ -36,13 +36,11 @@ class ClothContact {
   // Looks for cloth that has passed through cloth at the begin of a frame: until the next call such
   // pairs do not keep each other apart, but are led apart at up to `speed`, m/s (untangling.h). At
   // 0 they stay so.
-  void untangle(std::span<const MovingSheet> sheets, double speed,
-                ThreadPool& pool = calling_thread());
+  void untangle(std::span<const MovingSheet> sheets, double speed, ThreadPool& pool);
   // Whether there are any.
   bool untangles() const { return !untangling_.empty(); }
   // Of sheets that have taken a step of dt, s.
-  void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame,
-               ThreadPool& pool = calling_thread());
+  void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame, ThreadPool& pool);
   // How far that moved a particle at most, m.
   double moved() const { return corrected_; }
   // After resolve(): something else moved particles by so much at most, m.
@@ -67,8 +65,8 @@ class ClothContact {
   void look_ahead(std::span<const MovingSheet> sheets, double in_step, ThreadPool& pool);
   void read(std::span<MovingSheet> sheets, ThreadPool& pool);
   void write(std::span<MovingSheet> sheets);
-  const std::vector<ClothPair>& find_cuts(std::span<const MovingSheet> sheets, Matrix3Xd& x,
-                                          ThreadPool& pool);
+  Matrix3Xd good_positions(std::span<const MovingSheet> sheets) const;
+  const std::vector<ClothPair>& find_cuts(std::span<const MovingSheet> sheets, ThreadPool& pool);
 
   const Scene& scene_;
   Cloth cloth_;

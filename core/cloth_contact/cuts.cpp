@@ -51,9 +51,9 @@ std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Mat
 }
 
 ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
-                     std::size_t most_told, ThreadPool& pool) {
+                     std::size_t most_told) {
   std::vector<ClothCut> found;
-  for (const auto& [edge, triangle] : find_cuts(cloth, near, x, pool)) {
+  for (const auto& [edge, triangle] : find_cuts(cloth, near, x)) {
     const auto& [p, q] = cloth.edges[static_cast<std::size_t>(edge)];
     const auto& [a, b, c] = cloth.triangles[static_cast<std::size_t>(triangle)];
     found.push_back({static_cast<std::size_t>(cloth.sheet_of(p)),

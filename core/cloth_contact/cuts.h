@@ -32,6 +32,6 @@ std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Mat
                                  ThreadPool& pool = calling_thread());
 // Of the same.
 ClothCuts count_cuts(const Cloth& cloth, NearBlocks& near, const Matrix3Xd& x,
-                     std::size_t most_told, ThreadPool& pool = calling_thread());
+                     std::size_t most_told);
 
 }  // namespace weft

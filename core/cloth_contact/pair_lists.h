@@ -24,13 +24,13 @@ class PairLists {
   // Cloth was at `from` when a window began, and came to where it is now, (3 x particles) m. Has
   // the lists hold every pair that was nearer than its thickness and what its blocks have come
   // since, or kMostMotion.
-  void update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& pool = calling_thread());
+  void update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& pool);
   // The same for a window that begins at `from`, in which nothing will come farther in relation to
   // anything else than `come`, m.
-  void expect(const Matrix3Xd& from, double come, ThreadPool& pool = calling_thread());
+  void expect(const Matrix3Xd& from, double come, ThreadPool& pool);
   // While they are empty: cloth that was at the last `from` is now about here. Looks only whether
   // it may come as far as `come` from here on, m.
-  void look(const Places& now, double come, ThreadPool& pool = calling_thread());
+  void look(const Places& now, double come, ThreadPool& pool);
   // How far particles may come in relation to each other, from the last `from` or place looked at
   // on, until lists do not hold any more, m.
   double lasts() const { return lasts_; }

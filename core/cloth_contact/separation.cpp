@@ -32,14 +32,13 @@ void Separation::touch(std::span<const NearCloth> near, const Untangling& untang
   const Surroundings around{untangling, ways, most};
   const std::size_t shares = shares_of(pool, std::ssize(near), kLeastShare);
   found_.resize(2 * shares);
-  const auto touch_share = [&](int part) {
-    const bool edges = static_cast<std::size_t>(part) >= shares;
-    const auto share = static_cast<std::size_t>(part) - (edges ? shares : 0);
-    const std::size_t begin = near.size() * share / shares,
-                      end = near.size() * (share + 1) / shares;
-    touch(edges, near.subspan(begin, end - begin), around, found_[static_cast<std::size_t>(part)]);
-  };
-  pool.run(static_cast<int>(2 * shares), touch_share);
+  for (const bool edges : {false, true})
+    run_shares(pool, shares, std::ssize(near),
+               [&](std::size_t share, std::int64_t begin, std::int64_t end) {
+                 const auto part = near.subspan(static_cast<std::size_t>(begin),
+                                                static_cast<std::size_t>(end - begin));
+                 touch(edges, part, around, found_[share + (edges ? shares : 0)]);
+               });
   most_steps_ = std::numeric_limits<double>::infinity();
   for (const Found& found : found_) most_steps_ = std::min(most_steps_, found.most_steps);
 }

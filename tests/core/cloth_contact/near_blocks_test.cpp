@@ -93,8 +93,8 @@ TEST(BlockMotion, IsNoLessThanWhatAnyTwoParticlesMovedBy) {
     places.topRows<3>() = x.cast<float>();
     return places;
   };
-  exact.set(from, to);
-  rough.set(rounded(from), rounded(to));
+  exact.set(from, to, calling_thread());
+  rough.set(rounded(from), rounded(to), calling_thread());
   for (int a = 0; a < near.blocks(); ++a)
     for (int b = a; b < near.blocks(); ++b) {
       double most = 0;
@@ -198,7 +198,7 @@ TEST(PairLists, TellNoLongerWayThanSheetsHaveUntilTheyAreNear) {
   for (unsigned seed = 0; seed < 200; ++seed) {
     SCOPED_TRACE(seed);
     PairLists lists(cloth);
-    lists.expect(cloth.positions(from), 1e-4);
+    lists.expect(cloth.positions(from), 1e-4, calling_thread());
     ASSERT_TRUE(lists.empty());
     // some move, each as a whole
     Matrix3Xd way = kWay * noise(static_cast<int>(sheets.size()), seed);
@@ -212,7 +212,7 @@ TEST(PairLists, TellNoLongerWayThanSheetsHaveUntilTheyAreNear) {
     const Matrix3Xd all = cloth.positions(x);
     Places about = Places::Zero(4, all.cols());
     about.topRows<3>() = all.cast<float>();
-    lists.look(about, kCome);
+    lists.look(about, kCome, calling_thread());
     EXPECT_LE(lists.lasts(), std::max(least - cloth.thickest, 0.0));
     may_come += lists.lasts() >= kCome ? 1 : 0;
   }

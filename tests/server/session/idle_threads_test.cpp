@@ -132,18 +132,19 @@ TEST(IdleThreads, DoNotChangeTheFramesOfManyTriangles) {
 TEST(IdleThreads, DoNotChangeTheFramesOfSheetsInContact) {
   SheetDefinition below = flat_sheet(2, 2);
   below.name = "below";
-  below.shape = complete(triangle_mesh(square(Cut::kAlternating, 1, 1.0 / 70)));
+  below.shape = complete(triangle_mesh(square(Cut::kAlternating, 1, 1.0 / 50)));
   below.textile.model = light_textile(0.15);
   below.bending = Isometric{};
   SheetDefinition above = below;
   above.name = "above";
   above.origin.y() += 0.002;
-  above.rotation = Eigen::AngleAxisd(0.02, Vector3d::UnitZ());
+  above.rotation = Eigen::AngleAxisd(-0.004, Vector3d::UnitZ());
   Scene scene = floating(below);
   scene.sheets.push_back(above);
   scene.cloth_contact = true;
   scene.untangle = 1;
-  scene.solver.frame_step = 1e-3;
+  scene.solver.frame_step = 2e-4;
+  EXPECT_GT(Simulation(scene).cloth_cuts(), 0);
   expect_same_frames_by_many_threads(scene);
 }
 

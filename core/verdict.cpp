@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <utility>
 
 #include "core/cloth_contact/cuts.h"
@@ -161,10 +162,28 @@ void find_fallen(const Scene& scene, const std::vector<Matrix3Xd>& x, Verdict& v
   }
 }
 
+void find_loose_borders(const Scene& scene, const MovingBodies& bodies,
+                        const std::vector<Matrix3Xd>& x, double time, Verdict& verdict) {
+  if (!scene.dressing || !verdict.dressed || scene.colliders.empty()) return;
+  for (std::size_t s = 0; s < x.size(); ++s)
+    if (std::holds_alternative<Triangles>(scene.sheets[s].shape))
+      std::ranges::move(loose_borders(scene, bodies, scene.sheets[s], x[s], time),
+                        std::back_inserter(verdict.loose_borders));
+}
+
 std::string cuts_text(const Scene& scene, std::int64_t cuts, double time) {
   std::string text = join(cuts, " edges pass through cloth");
   if (const double end = end_of_untangling(scene); end > 0 && time >= end)
     text += join(", which could not be led apart within ", end, " s");
+  return text;
+}
+
+std::string loose_borders_text(const std::vector<LooseBorder>& borders) {
+  std::string text = join(borders.size(), borders.size() == 1 ? " border goes" : " borders go",
+                          " around no part of a body, as that of a sleeve or a strap beside it");
+  for (const auto& [length, panel] : borders)
+    text += join(&borders.front().length == &length ? ": " : ", ", 1000 * length, " mm",
+                 panel.empty() ? "" : " in panel \"" + panel + "\"");
   return text;
 }
 
@@ -187,6 +206,8 @@ void find_faults(const Scene& scene, double time, Verdict& verdict) {
   if (verdict.fallen > kMostFallen)
     fault("SLID_DOWN", join("the garment has come down by ", 1000 * verdict.fallen,
                             " mm, more than ", 1000 * kMostFallen, " mm: nothing holds it up"));
+  if (!verdict.loose_borders.empty())
+    fault("BESIDE_BODY", loose_borders_text(verdict.loose_borders));
   if (verdict.dressed && verdict.too_tight) {
     const auto& [strain, most, panel] = *verdict.too_tight;
     fault("TOO_TIGHT",
@@ -209,6 +230,7 @@ Verdict judge(const Scene& scene, const MovingBodies& bodies,
   find_inside(scene, bodies, x, time, verdict);
   find_slid(scene, sheets, x, verdict);
   find_fallen(scene, x, verdict);
+  find_loose_borders(scene, bodies, x, time, verdict);
   for (std::size_t s = 0; s < sheets.size(); ++s)
     if (!scene.colliders.empty() && x[s].cols() > 0)
       verdict.largest_pressure =

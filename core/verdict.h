@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/around_bodies.h"
 #include "core/model/scene.h"
 
 namespace weft {
@@ -38,7 +39,8 @@ struct Verdict {
   double largest_pressure = 0;  // of colliders on cloth, Pa
   double slid = 0;              // of what was held: farthest down from its start, its mean, m
   double fallen = 0;            // of sewn sheets without holds: their mean, m
-  std::vector<Fault> faults;    // none: it is good
+  std::vector<LooseBorder> loose_borders;  // of what is dressed
+  std::vector<Fault> faults;               // none: it is good
 };
 
 // The sheets as they are at the end of a frame at `time`, in the order of the scene.

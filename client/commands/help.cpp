@@ -129,6 +129,8 @@ is good is its verdict:
   INSIDE_BODY  particles are inside a body
   SLID_DOWN    what was held has come down by more than 30 mm, or a garment that
                nothing held by more than 150 mm
+  BESIDE_BODY  a border of a garment goes around no part of a body: a sleeve is
+               beside the arm, a strap beside the shoulder
   TOO_TIGHT    1 % of the cloth is strained by more than 10 %, and pulled by
                more than 30 N/m, or strained by more than 30 %: knits stretch
                where wovens do not

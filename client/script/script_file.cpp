@@ -543,8 +543,9 @@ class ScriptReader {
 
   // "good", or all the faults that a verdict shall have.
   static std::optional<std::set<std::string>> read_verdict(Fields& fields) {
-    static const std::set<std::string> kFaults{"CLOTH_CUTS",  "INSIDE_BODY", "NOT_AT_REST",
-                                               "NOT_DRESSED", "SLID_DOWN",   "TOO_TIGHT"};
+    static const std::set<std::string> kFaults{"BESIDE_BODY", "CLOTH_CUTS",  "INSIDE_BODY",
+                                               "NOT_AT_REST", "NOT_DRESSED", "SLID_DOWN",
+                                               "TOO_TIGHT"};
     const std::vector<std::string> wanted = fields.texts("verdict");
     if (!fields.has("verdict")) return std::nullopt;
     if (wanted.empty()) fields.fault("verdict", "give good, or faults");

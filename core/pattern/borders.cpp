@@ -39,13 +39,13 @@ struct Break {
 };
 
 // Two places that are sewn together, as shares of both sides' lengths.
-using Places = std::pair<double, double>;
+using SewnPlaces = std::pair<double, double>;
 
 // Where both sides are cut: breaks that lie next to each other, by that share at most, are sewn
 // together; each other one to what lies between those as it does.
-std::vector<Places> pair_breaks(const std::vector<Break>& first, const std::vector<Break>& second,
-                                double near) {
-  std::vector<Places> pairs;
+std::vector<SewnPlaces> pair_breaks(const std::vector<Break>& first,
+                                    const std::vector<Break>& second, double near) {
+  std::vector<SewnPlaces> pairs;
   for (std::size_t i = 0, j = 0; i < first.size() && j < second.size();) {
     const double apart = second[j].along - first[i].along;
     const bool both_ends = (i + 1 == first.size()) == (j + 1 == second.size());
@@ -54,22 +54,22 @@ std::vector<Places> pair_breaks(const std::vector<Break>& first, const std::vect
     else
       ++(apart > 0 ? i : j);
   }
-  std::vector<Places> all = pairs;
-  const auto add_others = [&](const std::vector<Break>& breaks, double Places::*own,
-                              double Places::*other) {
+  std::vector<SewnPlaces> all = pairs;
+  const auto add_others = [&](const std::vector<Break>& breaks, double SewnPlaces::*own,
+                              double SewnPlaces::*other) {
     std::size_t at = 0;
     for (const Break& each : breaks) {
       while (pairs[at + 1].*own < each.along && at + 2 < pairs.size()) ++at;
-      const Places &before = pairs[at], &after = pairs[at + 1];
+      const SewnPlaces &before = pairs[at], &after = pairs[at + 1];
       if (each.along == before.*own || each.along == after.*own) continue;
       const double part = (each.along - before.*own) / (after.*own - before.*own);
-      Places& added = all.emplace_back();
+      SewnPlaces& added = all.emplace_back();
       added.*own = each.along;
       added.*other = before.*other + part * (after.*other - before.*other);
     }
   };
-  add_others(first, &Places::first, &Places::second);
-  add_others(second, &Places::second, &Places::first);
+  add_others(first, &SewnPlaces::first, &SewnPlaces::second);
+  add_others(second, &SewnPlaces::second, &SewnPlaces::first);
   std::sort(all.begin(), all.end());
   return all;
 }
@@ -202,7 +202,7 @@ class Cutter {
                              second = breaks_of(seam.second, !seam.same_direction);
     const double lengths[2] = {length_of(seam.first), length_of(seam.second)};
     note_unequal(seam, field, lengths[0], lengths[1]);
-    const std::vector<Places> places =
+    const std::vector<SewnPlaces> places =
         pair_breaks(first, second, edge_ / 2 / std::max(lengths[0], lengths[1]));
     for (std::size_t k = 0; k + 1 < places.size(); ++k) {
       const int a = add_piece(seam.first, first, false, places[k].first, places[k + 1].first);

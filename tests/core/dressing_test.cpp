@@ -213,12 +213,13 @@ TEST(Dressing, ATightGarmentPressesAsItsTensionOverTheRadius) {
   EXPECT_EQ(verdict.particles_inside, 0);
 }
 
+std::vector<std::string> codes(const Simulation& simulation) {
+  std::vector<std::string> all;
+  for (const Fault& fault : simulation.verdict().faults) all.push_back(fault.code);
+  return all;
+}
+
 TEST(Dressing, IsJudgedByWhatIsWrongWithIt) {
-  const auto codes = [](const Simulation& simulation) {
-    std::vector<std::string> all;
-    for (const Fault& fault : simulation.verdict().faults) all.push_back(fault.code);
-    return all;
-  };
   Scene scene = around_pole(0.075);  // 19 % too small
   scene.environment.gravity = Vector3d::Zero();
   Simulation tight(scene);
@@ -227,17 +228,31 @@ TEST(Dressing, IsJudgedByWhatIsWrongWithIt) {
   dress(tight, 150);
   EXPECT_EQ(codes(tight), (std::vector<std::string>{"NOT_AT_REST", "TOO_TIGHT"}));
 
-  scene = around_pole(0.03);  // far too wide: it falls
+  scene = around_pole(0.03);  // far too wide: it falls off
   scene.dressing->holds = {{0, {0, 1, 2}, 0.3}};
   Simulation wide(scene);
   dress(wide, 150);
-  EXPECT_EQ(codes(wide), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN"}));
+  EXPECT_EQ(codes(wide), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN", "BESIDE_BODY"}));
 
   scene.dressing->holds.clear();
   Simulation falling(scene);
   dress(falling, 150);
-  EXPECT_EQ(codes(falling), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN"}));
+  EXPECT_EQ(codes(falling), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN", "BESIDE_BODY"}));
   EXPECT_THAT(falling.verdict().faults[1].message, ::testing::HasSubstr("nothing holds it up"));
+}
+
+TEST(Dressing, ATubeThatClosesBesideAPoleIsBesideIt) {
+  Scene scene = around_pole(0.05);
+  scene.environment.gravity = Vector3d::Zero();
+  std::get<Capsule>(scene.colliders[0].shape) = {Vector3d(0.3, -1, 0), Vector3d(0.3, 1, 0), 0.05};
+  Simulation simulation(scene);
+  dress(simulation, 1);
+  EXPECT_EQ(codes(simulation), (std::vector<std::string>{"NOT_DRESSED", "NOT_AT_REST"}));
+  dress(simulation, 150);
+  EXPECT_EQ(codes(simulation), (std::vector<std::string>{"NOT_AT_REST", "BESIDE_BODY"}));
+  EXPECT_THAT(simulation.verdict().faults[1].message,
+              ::testing::AllOf(::testing::StartsWith("2 borders go around no part of a body"),
+                               ::testing::HasSubstr(" mm in panel \"")));
 }
 
 TEST(Dressing, KnitsFitWhereWovensAreTooTight) {

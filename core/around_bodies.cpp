@@ -182,12 +182,8 @@ class SewnCloth {
 };
 
 // The panel with most of a border.
-std::string panel_of(const TriangleMesh& mesh, const std::vector<int>& border) {
-  const std::vector<int> sorted = [&] {
-    std::vector<int> all = border;
-    std::ranges::sort(all);
-    return all;
-  }();
+std::string panel_of(const TriangleMesh& mesh, std::vector<int> border) {
+  std::ranges::sort(border);
   std::string name;
   std::ptrdiff_t most = 0;
   auto triangle = mesh.triangles.begin();
@@ -195,7 +191,7 @@ std::string panel_of(const TriangleMesh& mesh, const std::vector<int>& border) {
     std::ptrdiff_t count = 0;
     for (const auto end = triangle + panel.triangles; triangle != end; ++triangle)
       count += std::ranges::count_if(*triangle,
-                                     [&](int i) { return std::ranges::binary_search(sorted, i); });
+                                     [&](int i) { return std::ranges::binary_search(border, i); });
     if (count > most) most = count, name = panel.name;
   }
   return name;
@@ -237,6 +233,7 @@ std::vector<LooseBorder> loose_borders(const Scene& scene, const MovingBodies& b
         continue;
     }
     bool around = is_around(line);
+    // as far as a line along the border is one of the same sleeve, leg or hood
     for (double level = kStep; level < length / 2 && !around; level += kStep) {
       const std::vector<Line> inwards = cloth.lines_at(level, distances);
       if (inwards.empty()) break;

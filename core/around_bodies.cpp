@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
 #include <numbers>
-#include <queue>
 #include <utility>
 
 #include "core/frame_values.h"
+#include "core/triangles/geodesics.h"
 #include "core/triangles/triangles.h"
 
 namespace weft {
@@ -24,8 +23,6 @@ constexpr double kStep = 0.025;     // from line to line inwards, m
 
 using Line = std::vector<Vector3d>;  // closed, m
 using Edge = std::pair<int, int>;    // the lower particle first
-
-Edge edge_of(int i, int j) { return {std::min(i, j), std::max(i, j)}; }
 
 double length_of(const Line& line) {
   double length = 0;
@@ -81,105 +78,53 @@ bool holds_part(const Line& line, const Depth& depth) {
   return false;
 }
 
-// The cloth of a sheet, as lines in it are read.
-class SewnCloth {
- public:
-  SewnCloth(const TriangleMesh& mesh, const Matrix3Xd& x) : mesh_(mesh), x_(x) {
-    std::map<Edge, int> uses;
-    beside_.resize(static_cast<std::size_t>(x.cols()));
-    for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-      for (std::size_t k = 0; k < 3; ++k) {
-        const int i = mesh.triangles[t][k], j = mesh.triangles[t][(k + 1) % 3];
-        ++uses[edge_of(i, j)];
-        const double length = (flat_corner(mesh, t, k) - flat_corner(mesh, t, (k + 1) % 3)).norm();
-        beside_[static_cast<std::size_t>(i)].push_back({length, j});
-        beside_[static_cast<std::size_t>(j)].push_back({length, i});
-      }
-    for (const auto& [edge, count] : uses)
-      if (count == 1)
-        next_[edge.first].push_back(edge.second), next_[edge.second].push_back(edge.first);
-  }
+Line line_through(const std::vector<int>& particles, const Matrix3Xd& x) {
+  Line line;
+  for (const int i : particles) line.push_back(x.col(i));
+  return line;
+}
 
-  // Particles of each border, one after the other.
-  std::vector<std::vector<int>> borders() const {
-    std::map<int, std::vector<int>> left = next_;
-    std::vector<std::vector<int>> all;
-    for (auto& [start, ways] : left)
-      while (!ways.empty()) {
-        std::vector<int>& border = all.emplace_back();
-        int at = start;
-        do {
-          border.push_back(at);
-          const int to = left[at].back();
-          left[at].pop_back();
-          std::erase(left[to], at);
-          at = to;
-        } while (at != start && !left[at].empty());
-      }
-    return all;
-  }
+// How far each particle is from these along the cloth, over its flat shape, m.
+std::vector<double> distances_from(const std::vector<int>& particles, const RestShape& shape) {
+  const auto count = static_cast<std::size_t>(shape.particles);
+  Tethers ways{{particles, std::vector<int>(count),
+                std::vector<double>(count, std::numeric_limits<double>::infinity())}};
+  measure_tethers(shape, ways);
+  return std::move(ways.front().length);
+}
 
-  Line line(const std::vector<int>& particles) const {
-    Line line;
-    for (const int i : particles) line.push_back(x_.col(i));
-    return line;
-  }
-
-  // How far each particle is from these along the cloth, about, over its flat shape, m.
-  std::vector<double> distances(const std::vector<int>& from) const {
-    std::vector<double> all(beside_.size(), std::numeric_limits<double>::infinity());
-    using Reached = std::pair<double, int>;
-    std::priority_queue<Reached, std::vector<Reached>, std::greater<>> queue;
-    for (const int i : from) all[static_cast<std::size_t>(i)] = 0, queue.push({0, i});
-    while (!queue.empty()) {
-      const auto [far, i] = queue.top();
-      queue.pop();
-      if (far > all[static_cast<std::size_t>(i)]) continue;
-      for (const auto& [length, j] : beside_[static_cast<std::size_t>(i)])
-        if (double& known = all[static_cast<std::size_t>(j)]; far + length < known)
-          known = far + length, queue.push({known, j});
+// The lines along which cloth is so far away; none where one of them does not close.
+std::vector<Line> lines_at(double level, const std::vector<double>& distances,
+                           const TriangleMesh& mesh, const Matrix3Xd& x) {
+  const auto far = [&](int i) { return distances[static_cast<std::size_t>(i)] - level; };
+  std::map<Edge, std::vector<Edge>> next;
+  for (const auto& triangle : mesh.triangles) {
+    std::vector<Edge> crossed;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [i, j] = std::minmax(triangle[k], triangle[(k + 1) % 3]);
+      if ((far(i) < 0) != (far(j) < 0)) crossed.push_back({i, j});
     }
-    return all;
+    if (crossed.size() != 2) continue;
+    next[crossed[0]].push_back(crossed[1]);
+    next[crossed[1]].push_back(crossed[0]);
   }
-
-  // The lines along which cloth is so far away; none where one of them does not close.
-  std::vector<Line> lines_at(double level, const std::vector<double>& distances) const {
-    const auto far = [&](int i) { return distances[static_cast<std::size_t>(i)] - level; };
-    std::map<Edge, std::vector<Edge>> next;
-    for (const auto& triangle : mesh_.triangles) {
-      std::vector<Edge> crossed;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const int i = triangle[k], j = triangle[(k + 1) % 3];
-        if ((far(i) < 0) != (far(j) < 0)) crossed.push_back(edge_of(i, j));
-      }
-      if (crossed.size() != 2) continue;
-      next[crossed[0]].push_back(crossed[1]);
-      next[crossed[1]].push_back(crossed[0]);
+  std::vector<Line> lines;
+  while (!next.empty()) {
+    Line& line = lines.emplace_back();
+    Edge at = next.begin()->first, before = at;
+    for (auto way = next.find(at); way != next.end(); way = next.find(at)) {
+      const std::vector<Edge>& ways = way->second;
+      if (ways.size() != 2) return {};
+      const double share = far(at.first) / (far(at.first) - far(at.second));
+      line.push_back(x.col(at.first) + share * (x.col(at.second) - x.col(at.first)));
+      const Edge to = ways[ways[0] == before ? 1 : 0];
+      before = at;
+      at = to;
+      next.erase(way);
     }
-    std::vector<Line> lines;
-    while (!next.empty()) {
-      Line& line = lines.emplace_back();
-      Edge at = next.begin()->first, before = at;
-      for (auto way = next.find(at); way != next.end(); way = next.find(at)) {
-        const std::vector<Edge>& ways = way->second;
-        if (ways.size() != 2) return {};
-        const double share = far(at.first) / (far(at.first) - far(at.second));
-        line.push_back(x_.col(at.first) + share * (x_.col(at.second) - x_.col(at.first)));
-        const Edge to = ways[ways[0] == before ? 1 : 0];
-        before = at;
-        at = to;
-        next.erase(way);
-      }
-    }
-    return lines;
   }
-
- private:
-  const TriangleMesh& mesh_;
-  const Matrix3Xd& x_;
-  std::vector<std::vector<std::pair<double, int>>> beside_;  // flat length and particle
-  std::map<int, std::vector<int>> next_;                     // along borders
-};
+  return lines;
+}
 
 // The panel with most of a border.
 std::string panel_of(const TriangleMesh& mesh, std::vector<int> border) {
@@ -214,13 +159,13 @@ std::vector<LooseBorder> loose_borders(const Scene& scene, const MovingBodies& b
   const auto is_around = [&](const Line& line) {
     return is_stuck(line, outside) || holds_part(line, depth);
   };
-  const SewnCloth cloth(mesh, x);
-  const auto borders = cloth.borders();
+  const RestShape shape = rest_shape(mesh);
+  const auto borders = borders_of(mesh);
   std::vector<LooseBorder> loose;
   for (const std::vector<int>& border : borders) {
-    const Line line = cloth.line(border);
+    const Line line = line_through(border, x);
     const double length = length_of(line);
-    const std::vector<double> distances = cloth.distances(border);
+    const std::vector<double> distances = distances_from(border, shape);
     // one of several of a piece of cloth
     if (std::ranges::none_of(borders, [&](const std::vector<int>& other) {
           const double far = distances[static_cast<std::size_t>(other.front())];
@@ -228,14 +173,14 @@ std::vector<LooseBorder> loose_borders(const Scene& scene, const MovingBodies& b
         }))
       continue;
     if (length < kHole) {
-      const std::vector<Line> inwards = cloth.lines_at(kTube, distances);
+      const std::vector<Line> inwards = lines_at(kTube, distances, mesh, x);
       if (inwards.size() != 1 || length_of(inwards[0]) > length + std::numbers::pi * kTube)
         continue;
     }
     bool around = is_around(line);
     // as far as a line along the border is one of the same sleeve, leg or hood
     for (double level = kStep; level < length / 2 && !around; level += kStep) {
-      const std::vector<Line> inwards = cloth.lines_at(level, distances);
+      const std::vector<Line> inwards = lines_at(level, distances, mesh, x);
       if (inwards.empty()) break;
       around = std::ranges::any_of(inwards, [&](const Line& each) {
         return length_of(each) < 2 * length && is_around(each);

@@ -3,33 +3,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
-#include <map>
 #include <set>
-#include <utility>
 
 #include "core/pattern/sets.h"
+#include "core/triangles/triangles.h"
 
 namespace weft {
 namespace {
-
-// Particles of each closed border, in order.
-std::vector<std::vector<int>> borders_of(const TriangleMesh& mesh) {
-  std::set<std::pair<int, int>> sides;
-  for (const auto& [a, b, c] : mesh.triangles)
-    for (const auto& side : {std::pair(a, b), {b, c}, {c, a}}) sides.insert(side);
-  std::map<int, int> next;
-  for (const auto& [from, to] : sides)
-    if (!sides.contains({to, from})) next[from] = to;
-  std::vector<std::vector<int>> borders;
-  while (!next.empty()) {
-    std::vector<int>& border = borders.emplace_back();
-    for (auto at = next.begin(); at != next.end(); at = next.find(border.back())) {
-      border.push_back(at->second);
-      next.erase(at);
-    }
-  }
-  return borders;
-}
 
 struct Heights {
   double low, top, mean;  // m

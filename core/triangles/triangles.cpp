@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
+#include <utility>
 
 #include "core/triangles/connections.h"
 #include "core/triangles/folds.h"
@@ -40,6 +42,32 @@ const Textile& textile_of(const SheetDefinition& sheet, int panel) {
   for (const PanelTextile& each : sheet.panel_textiles)
     if (each.panel == panel) return each.textile;
   return sheet.textile;
+}
+
+std::vector<std::vector<int>> borders_of(const TriangleMesh& mesh) {
+  std::map<std::pair<int, int>, int> uses;  // of edges
+  for (const auto& triangle : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) ++uses[std::minmax(triangle[k], triangle[(k + 1) % 3])];
+  std::map<int, std::vector<int>> ways;  // along borders, from a particle
+  for (const auto& [edge, count] : uses) {
+    if (count != 1) continue;
+    ways[edge.first].push_back(edge.second);
+    ways[edge.second].push_back(edge.first);
+  }
+  std::vector<std::vector<int>> borders;
+  for (auto& [start, left] : ways)
+    while (!left.empty()) {
+      std::vector<int>& border = borders.emplace_back();
+      int at = start;
+      do {
+        border.push_back(at);
+        const int to = ways[at].back();
+        ways[at].pop_back();
+        std::erase(ways[to], at);
+        at = to;
+      } while (at != start && !ways[at].empty());
+    }
+  return borders;
 }
 
 double least_density(const SheetDefinition& sheet) {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <string>
+#include <vector>
 
 #include "core/model/mesh.h"
 
@@ -13,6 +13,9 @@ inline const TriangleMesh& triangles_in(const SheetDefinition& sheet) {
 
 // The textile of a panel.
 const Textile& textile_of(const SheetDefinition& sheet, int panel);
+
+// Particles of each closed border, one after the other.
+std::vector<std::vector<int>> borders_of(const TriangleMesh& mesh);
 
 // Of all panels, kg/m^2. Precondition: textiles are measured.
 double least_density(const SheetDefinition& sheet);

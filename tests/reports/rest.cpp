@@ -70,38 +70,26 @@ std::string millimetres(double value) { return fmt::format("{:.2f}", 1e3 * value
 // in_time: as it moves, too.
 void compare(Page& page, std::vector<std::vector<std::string>>& rows, const std::string& name,
              int side, const Scene& scene, bool in_time) {
-  std::vector<std::string> row{name, std::to_string(side)}, values = row;
-  const auto add = [&](const std::string& shown, const std::string& value) {
-    row.push_back(shown);
-    values.push_back(value);
-  };
-  Rest moved;
+  std::optional<Rest> moved;
   if (in_time) {
     Simulation simulation(scene);
     moved = follow(simulation);
-    add(fmt::format("{:.1f}", moved.time), number(moved.time));
-    add(moved.reached ? seconds(moved.core) : "> " + seconds(moved.core), number(moved.core));
-  } else {
-    add("", "");
-    add("", "");
   }
-  Simulation simulation(scene);
-  if (simulation.act({{.kind = Action::Kind::kRelax}})) throw std::runtime_error("not relaxed");
-  const Rest direct = follow(simulation);
-  wake(simulation);
-  const double on = rms(follow(simulation).x - direct.x), residual = direct.residual.value_or(0);
-  add(std::to_string(direct.frames), std::to_string(direct.frames));
-  add(seconds(direct.core), number(direct.core));
-  add(fmt::format("{:.1e}", residual), number(residual));
-  add(millimetres(on), number(on));
-  if (in_time) {
-    const double apart = rms(direct.x - moved.x);
-    add(millimetres(apart), number(apart));
-  } else {
-    add("", "");
-  }
-  rows.push_back(row);
-  page.row(values);
+  Simulation relaxed(scene);
+  if (relaxed.act({{.kind = Action::Kind::kRelax}})) throw std::runtime_error("not relaxed");
+  const Rest direct = follow(relaxed);
+  wake(relaxed);
+  const double on = rms(follow(relaxed).x - direct.x);
+  const double apart = moved ? rms(direct.x - moved->x) : 0;
+  const double residual = direct.residual.value_or(0);
+  rows.push_back({name, std::to_string(side), moved ? fmt::format("{:.1f}", moved->time) : "",
+                  moved ? (moved->reached ? "" : "> ") + seconds(moved->core) : "",
+                  std::to_string(direct.frames), seconds(direct.core),
+                  fmt::format("{:.1e}", residual), millimetres(on),
+                  moved ? millimetres(apart) : ""});
+  page.row({name, std::to_string(side), moved ? number(moved->time) : "",
+            moved ? number(moved->core) : "", std::to_string(direct.frames), number(direct.core),
+            number(residual), number(on), moved ? number(apart) : ""});
 }
 
 }  // namespace

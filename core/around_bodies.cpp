@@ -102,7 +102,7 @@ std::vector<Line> lines_at(double level, const std::vector<double>& distances,
     std::vector<Edge> crossed;
     for (std::size_t k = 0; k < 3; ++k) {
       const auto [i, j] = std::minmax(triangle[k], triangle[(k + 1) % 3]);
-      if ((far(i) < 0) != (far(j) < 0)) crossed.push_back({i, j});
+      if ((far(i) < 0) != (far(j) < 0)) crossed.emplace_back(i, j);
     }
     if (crossed.size() != 2) continue;
     next[crossed[0]].push_back(crossed[1]);

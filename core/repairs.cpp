@@ -42,21 +42,40 @@ bool Repairs::grow(std::int64_t frame, StepPlan& step) {
 
 void Repairs::begin_frame() {
   doubtful_.reset();
+  tangled_ = 0;
   halvings_before_ = halvings_;
   repairs_before_ = all_.size();
 }
 
 Decision Repairs::judge(std::int64_t frame, const Attempt& made, StepPlan& step) {
   if (made.reason.empty()) return Decision::kDone;
+  if (made.tangles) return judge_tangled(frame, made, step);
   if (doubtful_ && made.confirms(*doubtful_)) {
-    set(halvings_ - 1, halvings_, step);
-    --halvings_;
-    all_.resize(repairs_before_ + static_cast<std::size_t>(halvings_ - halvings_before_));
+    take_back(1, step);
     return Decision::kConfirmed;
   }
   if (!halve({.frame = frame, .reason = made.reason}, step)) return Decision::kImpossible;
   doubtful_ = made;
   return Decision::kAgain;
+}
+
+// What is pulled through itself passes in steps of any length: then it is left so.
+Decision Repairs::judge_tangled(std::int64_t frame, const Attempt& made, StepPlan& step) {
+  constexpr int kMostTangled = 2;
+  doubtful_.reset();
+  if (tangled_ < kMostTangled && halve({.frame = frame, .reason = made.reason}, step)) {
+    ++tangled_;
+    return Decision::kAgain;
+  }
+  if (tangled_ == 0) return Decision::kDone;
+  take_back(tangled_, step);
+  return Decision::kConfirmed;
+}
+
+void Repairs::take_back(int halvings, StepPlan& step) {
+  set(halvings_ - halvings, halvings_, step);
+  halvings_ -= halvings;
+  all_.resize(repairs_before_ + static_cast<std::size_t>(halvings_ - halvings_before_));
 }
 
 bool Repairs::keep_halved(std::int64_t frame, const std::string& reason, StepPlan& step) {

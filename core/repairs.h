@@ -21,7 +21,8 @@ struct Repair {
 // What the guard says of an attempt at a frame.
 struct Attempt {
   std::vector<Inspection> sheets;
-  std::string reason;  // the first of theirs; empty: the frame is good
+  std::string reason;    // the first of theirs; empty: the frame is good
+  bool tangles = false;  // cloth passed through cloth, and nothing else speaks against it
 
   // Whether every sheet that is in doubt does here as it did there.
   bool confirms(const Attempt& other) const;
@@ -30,7 +31,7 @@ struct Attempt {
 // What is to be done after an attempt at a frame.
 enum class Decision {
   kDone,
-  kConfirmed,   // the attempt before it was right: its step stays, the state is this one's
+  kConfirmed,   // a longer step was right: it stays, the state is this one's
   kAgain,       // from the frame before, with half the step
   kImpossible,  // no shorter step is to be had
 };
@@ -42,6 +43,8 @@ class Repairs {
       : frame_step_(settings.frame_step), most_(settings.max_repairs) {}
 
   int halvings() const { return halvings_; }
+  // Attempts at the frame under way in which cloth passed through cloth.
+  int tangled() const { return tangled_; }
   const std::vector<Repair>& all() const { return all_; }
   // Of a frame; more are not computed.
   std::int64_t most_substeps() const { return most_substeps_; }
@@ -61,7 +64,9 @@ class Repairs {
   bool keep_halved(std::int64_t frame, const std::string& reason, StepPlan& step);
 
  private:
+  Decision judge_tangled(std::int64_t frame, const Attempt& made, StepPlan& step);
   bool halve(Repair repair, StepPlan& step);
+  void take_back(int halvings, StepPlan& step);
   // Substeps are doubled so many times instead of so many.
   void set(int halvings, int instead_of, StepPlan& step) const;
 
@@ -75,6 +80,7 @@ class Repairs {
   std::size_t repairs_before_ = 0;
   // the attempt before, with twice the step
   std::optional<Attempt> doubtful_;
+  int tangled_ = 0;
 };
 
 }  // namespace weft

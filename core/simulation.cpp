@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 #include "core/cloth_contact/tangles.h"
 #include "core/contact/contact.h"
@@ -38,7 +39,7 @@ FramePart Simulation::State::advance_frame(const Enough& enough, ThreadPool& poo
   NextStates& next = next_states(sheets.size());
   for (Decision decision = Decision::kAgain; decision == Decision::kAgain;) {
     if (!take_substeps(enough, pool)) return FramePart::kUnfinished;
-    decision = repair(inspect_sheets(next), next);
+    decision = repair(inspect_sheets(next, pool), next);
     if (decision != Decision::kImpossible) continue;
     unfinished.reset();
     return FramePart::kFailed;
@@ -90,7 +91,10 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
   if (!scene.colliders.empty()) bodies.place(scene.colliders, time + dt, dt);
   for (std::size_t s = 0; s < open_seams.size(); ++s)
     open_seams[s].keep_out(contacts_of(s, time, dt), dt, sheets[s]);
-  if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame, pool);
+  if (cloth_contact) {
+    const int most_steps = ClothContact::most_steps(std::ldexp(dt, repairs.tangled()));
+    cloth_contact->resolve(sheets, dt, most_steps, ends_frame, pool);
+  }
 
   // colliders last, so that no particle ends a step inside one
   if (scene.colliders.empty()) return;
@@ -133,7 +137,7 @@ bool Simulation::State::begin_frame(bool in_parts) {
 }
 
 // Has the guard look at the state that the solvers have come to.
-Attempt Simulation::State::inspect_sheets(NextStates& next) {
+Attempt Simulation::State::inspect_sheets(NextStates& next, ThreadPool& pool) {
   const double begin = time();
   Attempt made;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
@@ -148,6 +152,12 @@ Attempt Simulation::State::inspect_sheets(NextStates& next) {
             : inspect(sheet.mesh, drive, sheet.most_strain, sheet.good(), next[s]));
     if (made.reason.empty() && !made.sheets.back().reason.empty())
       made.reason = scene.sheets[s].name + ": " + made.sheets.back().reason;
+  }
+  if (!made.reason.empty() || !cloth_contact || scene.solver.max_repairs == 0) return made;
+  if (untangling_speed(scene, begin) > 0) return made;
+  if (const std::int64_t cuts = cloth_contact->first_cuts(sheets, next, pool); cuts > 0) {
+    made.tangles = true;
+    made.reason = std::to_string(cuts) + " cuts, where the frame began with none";
   }
   return made;
 }

@@ -78,7 +78,7 @@ struct Simulation::State {
   bool begin_frame(bool in_parts);
   bool take_substeps(const Enough& enough, ThreadPool& pool);
   void step(double time, double dt, bool ends_frame, ThreadPool& pool);
-  Attempt inspect_sheets(NextStates& next);
+  Attempt inspect_sheets(NextStates& next, ThreadPool& pool);
   Decision repair(const Attempt& made, NextStates& next);
   void begin_again();
   void restart_from(NextStates& next);

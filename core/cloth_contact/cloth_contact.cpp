@@ -41,8 +41,8 @@ void ClothContact::forget() {
   come_ = moved_ = 0;
 }
 
-void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame,
-                           ThreadPool& pool) {
+void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, int most_steps,
+                           bool ends_frame, ThreadPool& pool) {
   corrected_ = 0;
   cuts_.reset();
   double in_step = 0, pushed = 0;  // in relation to each other
@@ -61,7 +61,7 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
   const bool is_known = window_.is_known;
   // the begin of a window of one step told where it ends, unless pairs are led apart meanwhile
   const bool is_read = window_.steps == 1 && untangling_.empty();
-  window_ = {.most_steps = ends_frame ? 1 : most_steps(dt)};
+  window_ = {.most_steps = ends_frame ? 1 : most_steps};
   untangling_.lead(sheets, dt);
   if (is_known) {
     if (!is_read) read(sheets, pool);
@@ -117,6 +117,7 @@ double ClothContact::reach(double in_step) const {
 // What may have met in the window.
 void ClothContact::find_near(ThreadPool& pool) {
   const double most = PairLists::kMostMotion * cloth_.thickest;
+  has_met_ = has_met_ || come_ > most;
   near_.clear();
   const auto add = [&](const BlockPair& blocks, const Candidates& candidates, double come) {
     const auto friction = [&](int block) {
@@ -151,6 +152,7 @@ void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPoo
   const Separation::Ways ways{begin_, x_, d_, inverse_mass_};
   separation_.touch(near_, untangling_, ways, PairLists::kMostMotion * cloth_.thickest, pool);
   if (separation_.empty()) return separation_.forget_given();
+  has_met_ = true;
   const double steps =
       std::clamp(separation_.most_steps(), 1.0, static_cast<double>(window_.most_steps));
   if (!ends_frame) window_.most_steps = static_cast<int>(steps);
@@ -165,28 +167,41 @@ Matrix3Xd ClothContact::good_positions(std::span<const MovingSheet> sheets) cons
   return x;
 }
 
-// There: asked for at its end, and when the next one begins.
-const std::vector<ClothPair>& ClothContact::find_cuts(std::span<const MovingSheet> sheets,
-                                                      ThreadPool& pool) {
-  if (!cuts_) {
-    const Matrix3Xd x = good_positions(sheets);
-    lists_.blocks().set(x, pool);
-    cuts_ = weft::find_cuts(cloth_, lists_.blocks(), x, pool);
-  }
+std::vector<ClothPair> ClothContact::find_cuts(const Matrix3Xd& x, ThreadPool& pool) {
+  lists_.blocks().set(x, pool);
+  return weft::find_cuts(cloth_, lists_.blocks(), x, pool);
+}
+
+// Asked for at its end, and when the next one begins.
+const std::vector<ClothPair>& ClothContact::cuts_of_last(std::span<const MovingSheet> sheets,
+                                                         ThreadPool& pool) {
+  if (!cuts_) cuts_ = find_cuts(good_positions(sheets), pool);
   return *cuts_;
 }
 
 void ClothContact::untangle(std::span<const MovingSheet> sheets, double speed, ThreadPool& pool) {
   const bool was_empty = untangling_.empty();
   untangling_.clear();
+  has_met_ = false;
   if (speed > 0)
-    if (const std::vector<ClothPair>& cuts = find_cuts(sheets, pool); !cuts.empty())
+    if (const std::vector<ClothPair>& cuts = cuts_of_last(sheets, pool); !cuts.empty())
       untangling_.set(cuts, good_positions(sheets), speed);
   if (!was_empty || !untangling_.empty()) forget();
 }
 
+std::int64_t ClothContact::first_cuts(std::span<const MovingSheet> sheets,
+                                      std::span<const SheetState> end, ThreadPool& pool) {
+  if (!has_met_) return 0;
+  Matrix3Xd x;
+  cloth_.join([&](std::size_t s) -> const Matrix3Xd& { return end[s].x; }, x);
+  std::vector<ClothPair> cuts = find_cuts(x, pool);
+  const bool first = !cuts.empty() && find_cuts(good_positions(sheets), pool).empty();
+  cuts_ = std::move(cuts);
+  return first ? std::ssize(*cuts_) : 0;
+}
+
 std::int64_t ClothContact::count_cuts(std::span<const MovingSheet> sheets) {
-  return std::ssize(find_cuts(sheets, calling_thread()));
+  return std::ssize(cuts_of_last(sheets, calling_thread()));
 }
 
 void ClothContact::read(std::span<MovingSheet> sheets, ThreadPool& pool) {

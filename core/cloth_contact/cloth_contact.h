@@ -39,13 +39,17 @@ class ClothContact {
   void untangle(std::span<const MovingSheet> sheets, double speed, ThreadPool& pool);
   // Whether there are any.
   bool untangles() const { return !untangling_.empty(); }
-  // Of sheets that have taken a step of dt, s.
-  void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame, ThreadPool& pool);
+  // Of sheets that have taken a step of dt, s; it acts after `most_steps` of them, at most.
+  void resolve(std::span<MovingSheet> sheets, double dt, int most_steps, bool ends_frame,
+               ThreadPool& pool);
   // How far that moved a particle at most, m.
   double moved() const { return corrected_; }
   // After resolve(): something else moved particles by so much at most, m.
   void follow(double moved) { come_ += 2 * moved; }
 
+  // At the end of a frame, if it began with none; else 0.
+  std::int64_t first_cuts(std::span<const MovingSheet> sheets, std::span<const SheetState> end,
+                          ThreadPool& pool);
   // At the end of the last frame (cuts.h).
   std::int64_t count_cuts(std::span<const MovingSheet> sheets);
 
@@ -66,7 +70,8 @@ class ClothContact {
   void read(std::span<MovingSheet> sheets, ThreadPool& pool);
   void write(std::span<MovingSheet> sheets);
   Matrix3Xd good_positions(std::span<const MovingSheet> sheets) const;
-  const std::vector<ClothPair>& find_cuts(std::span<const MovingSheet> sheets, ThreadPool& pool);
+  std::vector<ClothPair> find_cuts(const Matrix3Xd& x, ThreadPool& pool);
+  const std::vector<ClothPair>& cuts_of_last(std::span<const MovingSheet> sheets, ThreadPool& pool);
 
   const Scene& scene_;
   Cloth cloth_;
@@ -78,6 +83,7 @@ class ClothContact {
   // until there, m
   double come_ = 0, moved_ = 0;
   double corrected_ = 0;  // how far contact moved a particle in the last step at most, m
+  bool has_met_ = false;  // since untangle(): whether anything may have met
 
   std::vector<double> inverse_mass_;  // of all particles, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m
@@ -87,7 +93,7 @@ class ClothContact {
   Untangling untangling_;
   std::vector<int> changed_;                    // of a sheet, by its own numbers
   std::vector<int> numbers_;                    // 0, 1, ... of the largest sheet
-  std::optional<std::vector<ClothPair>> cuts_;  // where nothing has moved since
+  std::optional<std::vector<ClothPair>> cuts_;  // of the last frame, where nothing has moved since
 };
 
 }  // namespace weft

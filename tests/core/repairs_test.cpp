@@ -77,6 +77,31 @@ TEST(Repairs, WhatTwoStepsShowDifferentlyIsHalvedAgain) {
   EXPECT_EQ(repairs.all().size(), 1U);
 }
 
+TEST(Repairs, WhereClothPassesThroughClothTwoShorterStepsAreTried) {
+  Repairs repairs = repairs_of_at_most(12);
+  StepPlan step = ten_substeps();
+  const Attempt tangled{{{}}, "cuts", true};
+  EXPECT_EQ(repairs.judge(1, tangled, step), Decision::kAgain);
+  EXPECT_EQ(repairs.tangled(), 1);
+  EXPECT_EQ(repairs.judge(1, kGood, step), Decision::kDone);
+  EXPECT_EQ(step.substeps, 20);
+  EXPECT_EQ(repairs.all().size(), 1U);
+  repairs.begin_frame();
+  EXPECT_EQ(repairs.judge(2, tangled, step), Decision::kAgain);
+  EXPECT_EQ(repairs.judge(2, tangled, step), Decision::kAgain);
+  EXPECT_EQ(step.substeps, 80);
+  EXPECT_EQ(repairs.judge(2, tangled, step), Decision::kConfirmed);
+  EXPECT_EQ(step.substeps, 20);
+  EXPECT_EQ(repairs.all().size(), 1U);
+}
+
+TEST(Repairs, WhereClothPassesThroughClothNoFrameFailsForIt) {
+  Repairs none = repairs_of_at_most(0);
+  StepPlan step = ten_substeps();
+  EXPECT_EQ(none.judge(1, {{{}}, "cuts", true}, step), Decision::kDone);
+  EXPECT_EQ(step.substeps, 10);
+}
+
 TEST(Repairs, AnAttemptAtTheFrameBeforeConfirmsNothing) {
   Repairs repairs = repairs_of_at_most(12);
   StepPlan step = ten_substeps();

@@ -418,6 +418,58 @@ TEST(ClothContact, ASheetPouredIntoAHeapDoesNotPassThroughItself) {
   EXPECT_LT(positions(simulation).row(1).maxCoeff(), 0.1);
 }
 
+// Upright, in waves, on a floor; in steps that are long for its crumpling.
+Scene crumpling() {
+  SheetDefinition sheet = triangles(0.15, 0.15, 0.0125);
+  std::get<MeasuredTextile>(sheet.textile.model) = light_textile(0.2);
+  Matrix3Xd x = start_positions(sheet);
+  for (auto at : x.colwise())
+    at = Vector3d(at.x(), at.z() + 0.01,
+                  0.02 * std::sin(20 * at.z()) + 1e-3 * std::sin(200 * at.x()));
+  sheet.start_positions = values(x);
+  Scene scene = touching({sheet});
+  scene.colliders.push_back({"floor", Plane{}, 0.5, {}});
+  scene.solver = default_settings(Accuracy::kDraft);
+  return scene;
+}
+
+TEST(ClothContact, AFrameInWhichClothPassesThroughItselfIsComputedAgainInShorterSteps) {
+  Scene unguarded = crumpling();
+  unguarded.solver.max_repairs = 0;
+  Simulation simulation(crumpling()), passes(unguarded);
+  std::int64_t cuts = 0, cuts_unguarded = 0;
+  for (int frame = 0; frame < 15; ++frame) {
+    ASSERT_TRUE(simulation.advance_frame());
+    ASSERT_TRUE(passes.advance_frame());
+    cuts += cuts_now(simulation);
+    cuts_unguarded += cuts_now(passes);
+  }
+  EXPECT_GT(cuts_unguarded, 0);
+  EXPECT_EQ(cuts, 0);
+  ASSERT_EQ(simulation.repairs().size(), 1u);
+  EXPECT_THAT(simulation.repairs()[0].reason,
+              ::testing::MatchesRegex("[0-9]+ cuts, where the frame began with none"));
+}
+
+// Two sheets that are held everywhere, one of which is led through the other.
+TEST(ClothContact, WhatIsPulledThroughClothIsToldAndKeepsTheStep) {
+  SheetDefinition one = triangles(0.05, 0.05), other = triangles(0.05, 0.05);
+  other.name = "other";
+  other.origin = {0.003, 0.02, 0.004};
+  other.rotation = Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX()));
+  for (SheetDefinition* sheet : {&one, &other}) {
+    Pin& pin = sheet->pins.emplace_back();
+    for (int i = 0; i < sheet->particle_count(); ++i) pin.particles.push_back(i);
+  }
+  other.pins[0].path = {{0, Vector3d::Zero()}, {0.2, Vector3d(0, -0.012, 0)}};
+  Simulation simulation(touching({one, other}));
+  const std::int64_t planned = simulation.plan().step.substeps;
+  for (int frame = 0; frame < 12; ++frame) ASSERT_TRUE(simulation.advance_frame());
+  EXPECT_GT(simulation.stats().cloth_cuts, 0);
+  EXPECT_EQ(simulation.substeps(), planned);
+  EXPECT_TRUE(simulation.repairs().empty());
+}
+
 // The energy that it gets is no fault of the step.
 TEST(ClothContact, ASheetThatAnotherDrawsAlongNeedsNoRepair) {
   SheetDefinition cloth = triangles(0.3, 0.08), napkin = triangles(0.04, 0.04);

@@ -323,18 +323,23 @@ v1::Pattern dress(const DressForm& form) {
 // closed, it could not turn over.
 void add_collar(Draft& draft, const Bodice& b, const Surroundings& body) {
   constexpr double kStand = 0.03, kFall = 0.045, kWider = 0.022, kTurned = 3;
+  constexpr double kAround = 0.003;  // of the cloth that it lies over, a quarter of the way
+  constexpr double kTurn = 2.5;      // rad: it starts above the shoulders that it comes down on
   for (const bool front : {true, false}) {
     const std::string name = front ? "front" : "back";
     const Outline bodice = bodice_outline(b, front);
     const double half = bodice.length("neck") / 2, low = b.neck + 0.01, roll = low + kStand;
     const auto place = front ? front_of : back_of;
     const Outline stand = band_outline(half, low, kStand, front),
-                  fall =
-                      trapezoid("lower", roll, half, "upper", roll + kFall, half + kWider, front);
+                  fall = trapezoid("lower", roll, half + kAround, "upper", roll + kFall,
+                                   half + kWider, front);
     draft.add("stand-" + name, stand, place(stand, body), std::numbers::pi / 2);
     PanelPlace turned = place(bodice, body);
-    turned.origin += Vector3d(0, 2 * roll, front ? kClear : -kClear);
-    turned.rotation = Eigen::AngleAxisd(std::numbers::pi, Vector3d::UnitX()) * turned.rotation;
+    const double out = front ? 1 : -1;
+    const Quaterniond turn(Eigen::AngleAxisd(out * kTurn, Vector3d::UnitX()));
+    const Vector3d edge(0, roll, 0);
+    turned.origin += edge - turn * edge + Vector3d(0, 0, out * kClear);
+    turned.rotation = turn * turned.rotation;
     draft.add("fall-" + name, fall, turned, std::numbers::pi / 2);
     draft.sew({name, {"neck"}}, {"stand-" + name, {"lower"}});
     draft.sew({"stand-" + name, {"upper"}}, {"fall-" + name, {"lower"}}, kTurned);

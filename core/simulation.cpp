@@ -140,16 +140,12 @@ bool Simulation::State::begin_frame(bool in_parts) {
 Attempt Simulation::State::inspect_sheets(NextStates& next, ThreadPool& pool) {
   const double begin = time();
   Attempt made;
-  double motion = 0;  // J
-  if (cloth_contact)
-    for (const MovingSheet& sheet : sheets) motion += sheet.good().kinetic_energy;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     MovingSheet& sheet = sheets[s];
     sheet.read(next[s]);
-    const double others = cloth_contact ? motion - sheet.good().kinetic_energy : 0;
     const Drive drive{sheet.dynamics.gravity,
                       drive_speed(scene, scene.sheets[s], begin, begin + scene.solver.frame_step),
-                      scene.solver.frame_step, others};
+                      scene.solver.frame_step};
     made.sheets.push_back(
         scene.solver.max_repairs == 0
             ? inspect_finite(next[s])

@@ -24,7 +24,6 @@ struct Drive {
   Vector3d gravity = Vector3d::Zero();  // m/s^2
   double speed = 0;                     // the fastest of its pins, the colliders and the wind, m/s
   double frame_step = 0;                // s
-  double others = 0;                    // kinetic energy of sheets that may push it, J
 };
 
 // The fastest that pins and colliders move between two times, m/s.
@@ -44,9 +43,8 @@ struct Inspection {
 
 // Looks for a sheet that diverged: a position or velocity that is not finite; a strain above
 // `most_strain`; energy (kinetic, elastic and gravity) that grew by more than the sheet had at
-// `before`, as motion and elastic energy, plus the motion of sheets that may push it, plus
-// 10 M (u^2 + (g T)^2), u the speed of the drive and T the frame step. Energies are added up only
-// where the kinetic one calls for it.
+// `before`, as motion and elastic energy, plus 10 M (u^2 + (g T)^2), u the speed of the drive and T
+// the frame step. Energies are added up only where the kinetic one calls for it.
 Inspection inspect(const Mesh& mesh, const Drive& drive, double most_strain,
                    const SheetState& before, const SheetState& after);
 

@@ -199,9 +199,6 @@ TEST(Guard, EnergyMayGrowByWhatTheSheetHadAndByWhatDrivesIt) {
   EXPECT_NE(reason(pulled, still, moving(40)), "");
   EXPECT_EQ(reason(none, moving(1), moving(1.4)), "") << "less than twice the energy";
   EXPECT_NE(reason(none, moving(1), moving(2)), "");
-  const double met = moving(2).kinetic_energy;  // J
-  EXPECT_EQ(reason({{0, 0, 0}, 0, 0.01, met}, still, moving(1.9)), "") << "of a sheet that it met";
-  EXPECT_NE(reason({{0, 0, 0}, 0, 0.01, met}, still, moving(2.1)), "");
 }
 
 }  // namespace

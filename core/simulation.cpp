@@ -239,6 +239,7 @@ bool Simulation::State::keep_to_budget(NextStates& next) {
 bool Simulation::State::fail(const char* what, const std::string& reason) {
   failure = "frame " + std::to_string(frame + 1) + " cannot be " + what + " after " +
             std::to_string(repairs.halvings()) + " halvings of the step: " + reason;
+  if (cloth_contact) cloth_contact->forget();  // what it found is of that frame
   return false;
 }
 

@@ -59,7 +59,7 @@ Decision Repairs::judge(std::int64_t frame, const Attempt& made, StepPlan& step)
   return Decision::kAgain;
 }
 
-// What is pulled through itself passes in steps of any length: then it is left so.
+// Where cloth passes in shorter steps as well, the frame is left so.
 Decision Repairs::judge_tangled(std::int64_t frame, const Attempt& made, StepPlan& step) {
   constexpr int kMostTangled = 2;
   doubtful_.reset();

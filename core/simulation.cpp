@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 
 #include "core/cloth_contact/tangles.h"
 #include "core/contact/contact.h"
@@ -66,7 +65,7 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   const std::int64_t settling = std::max<std::int64_t>(1, plan.step.substeps / kSettlings);
   const bool settles = is_relaxing() && relaxation->settling > 0;
   if (cloth_contact && unfinished->substeps == 0)
-    cloth_contact->untangle(sheets, untangling_speed(scene, begin), pool);
+    cloth_contact->begin_frame(sheets, repairs.tangled(), untangling_speed(scene, begin), pool);
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
     step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
     ++k;
@@ -91,10 +90,7 @@ void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool
   if (!scene.colliders.empty()) bodies.place(scene.colliders, time + dt, dt);
   for (std::size_t s = 0; s < open_seams.size(); ++s)
     open_seams[s].keep_out(contacts_of(s, time, dt), dt, sheets[s]);
-  if (cloth_contact) {
-    const int most_steps = ClothContact::most_steps(std::ldexp(dt, repairs.tangled()));
-    cloth_contact->resolve(sheets, dt, most_steps, ends_frame, pool);
-  }
+  if (cloth_contact) cloth_contact->resolve(sheets, dt, ends_frame, pool);
 
   // colliders last, so that no particle ends a step inside one
   if (scene.colliders.empty()) return;

@@ -323,8 +323,8 @@ v1::Pattern dress(const DressForm& form) {
 // closed, it could not turn over.
 void add_collar(Draft& draft, const Bodice& b, const Surroundings& body) {
   constexpr double kStand = 0.03, kFall = 0.045, kWider = 0.022, kTurned = 3;
-  constexpr double kAround = 0.003;  // of the cloth that it lies over, a quarter of the way
-  constexpr double kTurn = 2.5;      // rad: it starts above the shoulders that it comes down on
+  constexpr double kAround = 0.003;     // m: it is longer than the stand it lies around by four
+  constexpr double kFirstTurned = 2.5;  // rad: it starts above the shoulders that it comes down on
   for (const bool front : {true, false}) {
     const std::string name = front ? "front" : "back";
     const Outline bodice = bodice_outline(b, front);
@@ -336,7 +336,7 @@ void add_collar(Draft& draft, const Bodice& b, const Surroundings& body) {
     draft.add("stand-" + name, stand, place(stand, body), std::numbers::pi / 2);
     PanelPlace turned = place(bodice, body);
     const double out = front ? 1 : -1;
-    const Quaterniond turn(Eigen::AngleAxisd(out * kTurn, Vector3d::UnitX()));
+    const Quaterniond turn(Eigen::AngleAxisd(out * kFirstTurned, Vector3d::UnitX()));
     const Vector3d edge(0, roll, 0);
     turned.origin += edge - turn * edge + Vector3d(0, 0, out * kClear);
     turned.rotation = turn * turned.rotation;

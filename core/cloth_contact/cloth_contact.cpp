@@ -24,8 +24,8 @@ ClothContact::ClothContact(const Scene& scene, const LeftOut& left_out)
   forget();
 }
 
-int ClothContact::most_steps(double dt) {
-  return std::max(1, static_cast<int>(std::min(kWindowTime / dt, 1e6)));
+int ClothContact::most_steps(double dt, int halvings) {
+  return std::max(1, static_cast<int>(std::min(std::ldexp(kWindowTime / dt, -halvings), 1e6)));
 }
 
 void ClothContact::forget() {
@@ -41,8 +41,8 @@ void ClothContact::forget() {
   come_ = moved_ = 0;
 }
 
-void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, int most_steps,
-                           bool ends_frame, ThreadPool& pool) {
+void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame,
+                           ThreadPool& pool) {
   corrected_ = 0;
   cuts_.reset();
   double in_step = 0, pushed = 0;  // in relation to each other
@@ -61,7 +61,7 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, int most_st
   const bool is_known = window_.is_known;
   // the begin of a window of one step told where it ends, unless pairs are led apart meanwhile
   const bool is_read = window_.steps == 1 && untangling_.empty();
-  window_ = {.most_steps = ends_frame ? 1 : most_steps};
+  window_ = {.most_steps = ends_frame ? 1 : most_steps(dt, halvings_)};
   untangling_.lead(sheets, dt);
   if (is_known) {
     if (!is_read) read(sheets, pool);
@@ -179,7 +179,9 @@ const std::vector<ClothPair>& ClothContact::cuts_of_last(std::span<const MovingS
   return *cuts_;
 }
 
-void ClothContact::untangle(std::span<const MovingSheet> sheets, double speed, ThreadPool& pool) {
+void ClothContact::begin_frame(std::span<const MovingSheet> sheets, int halvings, double speed,
+                               ThreadPool& pool) {
+  halvings_ = halvings;
   const bool was_empty = untangling_.empty();
   untangling_.clear();
   has_met_ = false;

@@ -27,21 +27,21 @@ class ClothContact {
   // Holds on to the scene.
   explicit ClothContact(const Scene& scene, const LeftOut& left_out = {});
 
-  // After how many steps of dt (s) it acts, at most.
-  static int most_steps(double dt);
-
   // Sheets may be anywhere now, or be held otherwise, at the begin of a frame. Nothing that was
   // found before is used, nor kept in memory.
   void forget();
-  // Looks for cloth that has passed through cloth at the begin of a frame: until the next call such
-  // pairs do not keep each other apart, but are led apart at up to `speed`, m/s (untangling.h). At
-  // 0 they stay so.
-  void untangle(std::span<const MovingSheet> sheets, double speed, ThreadPool& pool);
+  // After how many steps of dt (s) it acts, at most, where windows are halved so often.
+  static int most_steps(double dt, int halvings = 0);
+
+  // To be called before each attempt at a frame, in which windows are halved so often. Looks for
+  // cloth that has passed through cloth: until the next call such pairs do not keep each other
+  // apart, but are led apart at up to `speed`, m/s (untangling.h). At 0 they stay so.
+  void begin_frame(std::span<const MovingSheet> sheets, int halvings, double speed,
+                   ThreadPool& pool);
   // Whether there are any.
   bool untangles() const { return !untangling_.empty(); }
-  // Of sheets that have taken a step of dt, s; it acts after `most_steps` of them, at most.
-  void resolve(std::span<MovingSheet> sheets, double dt, int most_steps, bool ends_frame,
-               ThreadPool& pool);
+  // Of sheets that have taken a step of dt, s.
+  void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame, ThreadPool& pool);
   // How far that moved a particle at most, m.
   double moved() const { return corrected_; }
   // After resolve(): something else moved particles by so much at most, m.
@@ -83,7 +83,8 @@ class ClothContact {
   // until there, m
   double come_ = 0, moved_ = 0;
   double corrected_ = 0;  // how far contact moved a particle in the last step at most, m
-  bool has_met_ = false;  // since untangle(): whether anything may have met
+  int halvings_ = 0;      // of windows in this frame
+  bool has_met_ = false;  // whether anything may have in it
 
   std::vector<double> inverse_mass_;  // of all particles, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m

@@ -451,25 +451,6 @@ TEST(ClothContact, AFrameInWhichClothPassesThroughItselfIsComputedAgainInShorter
               ::testing::MatchesRegex("[0-9]+ cuts, where the frame began with none"));
 }
 
-// Two sheets that are held everywhere, one of which is led through the other.
-TEST(ClothContact, WhatIsPulledThroughClothIsToldAndKeepsTheStep) {
-  SheetDefinition one = triangles(0.05, 0.05), other = triangles(0.05, 0.05);
-  other.name = "other";
-  other.origin = {0.003, 0.02, 0.004};
-  other.rotation = Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX()));
-  for (SheetDefinition* sheet : {&one, &other}) {
-    Pin& pin = sheet->pins.emplace_back();
-    for (int i = 0; i < sheet->particle_count(); ++i) pin.particles.push_back(i);
-  }
-  other.pins[0].path = {{0, Vector3d::Zero()}, {0.2, Vector3d(0, -0.012, 0)}};
-  Simulation simulation(touching({one, other}));
-  const std::int64_t planned = simulation.plan().step.substeps;
-  for (int frame = 0; frame < 12; ++frame) ASSERT_TRUE(simulation.advance_frame());
-  EXPECT_GT(simulation.stats().cloth_cuts, 0);
-  EXPECT_EQ(simulation.substeps(), planned);
-  EXPECT_TRUE(simulation.repairs().empty());
-}
-
 // The energy that it gets is no fault of the step.
 TEST(ClothContact, ASheetThatAnotherDrawsAlongNeedsNoRepair) {
   SheetDefinition cloth = triangles(0.3, 0.08), napkin = triangles(0.04, 0.04);

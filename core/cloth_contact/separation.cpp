@@ -94,6 +94,8 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
                      const Surroundings& around, Found& found) {
   constexpr double kLeastReach = 0.02;  // of the thickness, where things nearly touch
   constexpr double kLeastMoves = 0.01;  // of its lightest particle's 1 / mass
+  // of the thickness; in heaps and stacks that fall a pair gives up to half of it
+  constexpr double kMostGiven = 1, kMostGivenIfHeld = 0.1;
   // of all of the one to all of the other, m^2
   const auto farthest = [&](Eigen::Vector4d (Ways::*motion)(int) const) {
     std::array<Eigen::Vector4d, 4> by;
@@ -110,12 +112,14 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
 
   std::array<double, 4> share;
   double moves = 0, lightest = 0;  // 1/kg, of what the pair moves
+  std::array<bool, 2> is_held{};   // a particle of each side
   for (std::size_t n = 0; n < 4; ++n) {
     const double inverse =
         around.ways.inverse_mass[static_cast<std::size_t>(candidate.particle[n])];
     share[n] = weight[n] * inverse;
     moves += weight[n] * share[n];
     lightest = std::max(lightest, inverse);
+    if (inverse == 0) is_held[n < (edges ? 2 : 1) ? 0 : 1] = true;
   }
   // what is held there, or moves far where its nearest point moves little, stays as it is
   if (moves <= kLeastMoves * lightest) return;
@@ -134,6 +138,8 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   contact.room = room;
   contact.thickness = candidate.thickness;
   contact.friction = friction;
+  contact.most_given =
+      (is_held[0] && is_held[1] ? kMostGivenIfHeld : kMostGiven) * candidate.thickness;
 }
 
 // Has the particles of all contacts begin with their own ways.
@@ -185,11 +191,14 @@ void Separation::separate(double steps, const Ways& ways) {
       for (const int i : contact.particle)
         changed = std::max(changed, changed_[static_cast<std::size_t>(i)]);
       if (changed <= contact.looked_at) return;
-      if (separate(steps, contact) > kSmall * contact.thickness) {
+      const double by = separate(steps, contact);
+      const bool gives_up = std::max(contact.way.along, contact.in_step.along) > contact.most_given;
+      if (gives_up) give_up(contact);
+      if (gives_up || by > kSmall * contact.thickness) {
         ++now;
         for (const int i : contact.particle) changed_[static_cast<std::size_t>(i)] = now;
       }
-      contact.looked_at = now;
+      contact.looked_at = gives_up ? std::numeric_limits<int>::max() : now;
     });
     if (now == before) break;
   }
@@ -241,6 +250,19 @@ double Separation::separate(double steps, Contact& contact) {
     mover(n).in_step += contact.share[n] * braked;
   }
   return std::max(std::abs(pushed), std::abs(contact.in_step.along - braked_before) * steps);
+}
+
+// Takes back what it has given.
+void Separation::give_up(Contact& contact) {
+  const auto of = [&](const Change& given) -> Eigen::Vector4d {
+    return given.along * contact.normal + given.sliding;
+  };
+  for (std::size_t n = 0; n < 4; ++n) {
+    Mover& mover = movers_[static_cast<std::size_t>(contact.particle[n])];
+    mover.way -= contact.share[n] * of(contact.way);
+    mover.in_step -= contact.share[n] * of(contact.in_step);
+  }
+  contact.way = contact.in_step = {};
 }
 
 void Separation::forget_given() {

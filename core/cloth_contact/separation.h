@@ -32,9 +32,11 @@ struct NearCloth {
 // thickness, or would in the steps to come, and friction by Coulomb as much of its sliding as that
 // allows. Pairs that are nearer all the same are moved apart without speed, some of the way each
 // time. Where all but a corner is held, which the nearest points hardly follow, a pair does not
-// act. What a pair gives to one it takes from the other. Pairs follow one another in their order,
-// again and again, and take back what others have made needless; they begin with what they gave the
-// last time, which in cloth that lies still is what they will give.
+// act; nor does one that has given more than any that settles, for it stands against others, as
+// where held cloth is led through held cloth. What a pair gives to one it takes from the other.
+// Pairs follow one another in their order, again and again, and take back what others have made
+// needless; they begin with what they gave the last time, which in cloth that lies still is what
+// they will give.
 class Separation {
  public:
   // Where particles set out, where they are now, and their displacement in the last step, (3 x
@@ -88,6 +90,7 @@ class Separation {
     Eigen::Vector4d normal = {};
     double room = 0;                     // to its thickness, where it set out, m
     double thickness = 0, friction = 0;  // m, 1
+    double most_given = 0;               // along the normal, m
     Change way = {}, in_step = {};       // that it has given, m
   };
   struct Given {
@@ -118,6 +121,7 @@ class Separation {
   static Eigen::Vector4d give(const Eigen::Vector4d& motion, const Eigen::Vector4d& normal,
                               double least, double friction, double free, Change& given);
   double separate(double steps, Contact& contact);
+  void give_up(Contact& contact);
   std::size_t find_given(const Contact& contact, std::size_t next) const;
   void keep_given();
 

@@ -2,7 +2,11 @@
 // refusal, or a repaired run; none in a hang, a crash or a frame that is not finite.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <string>
+
 #include "core/motion/guard.h"
+#include "core/triangles/cut.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::testing {
@@ -191,6 +195,90 @@ TEST(HostileScene, EveryIntegratorIsRepaired) {
     scene.solver.allow_unstable = true;
     EXPECT_FALSE(run(scene, 100, 1).repairs().empty());
   }
+}
+
+SheetDefinition woollen(const std::string& name, double side) {
+  SheetDefinition sheet;
+  sheet.name = name;
+  sheet.shape = complete(triangle_mesh(cut_rectangle(Cut::kAlternating, side, side, 0.01)));
+  sheet.textile.model = MeasuredTextile{.areal_density = 0.168,
+                                        .tensile_warp = 2133,
+                                        .tensile_weft = 1671,
+                                        .shear = 26.17,
+                                        .bend_rigidity_warp = 5.56e-6,
+                                        .bend_rigidity_weft = 5.02e-6};
+  sheet.bending = Isometric{};
+  return sheet;
+}
+
+// A swatch of 10 cm that is held along its border, and a plate above it, held everywhere, whose rim
+// is that far within, m; it is led down in 0.1 s.
+Scene plate_through_swatch(double within, double down) {
+  constexpr double kSide = 0.1;
+  SheetDefinition swatch = woollen("swatch", kSide), plate = woollen("plate", kSide - 2 * within);
+  const Matrix3Xd x = start_positions(swatch);
+  Pin& border = swatch.pins.emplace_back();
+  for (int i = 0; i < x.cols(); ++i) {
+    const Vector3d from_middle = x.col(i) - Vector3d(kSide / 2, 0, kSide / 2);
+    if (from_middle.cwiseAbs().maxCoeff() > kSide / 2 - 1e-9) border.particles.push_back(i);
+  }
+  plate.origin = {within, 0.004, within};
+  Pin& all = plate.pins.emplace_back();
+  for (int i = 0; i < plate.particle_count(); ++i) all.particles.push_back(i);
+  all.path = {{0, Vector3d::Zero()}, {0.1, Vector3d(0, -down, 0)}};
+  Scene scene;
+  scene.sheets = {swatch, plate};
+  scene.cloth_contact = true;
+  scene.environment.gravity.setZero();
+  return scene;
+}
+
+struct PassedThrough {
+  std::int64_t most_cuts = 0, cuts = 0;  // in any frame; at the end
+  double strain = 0;                     // largest in any frame
+  std::size_t repairs = 0;
+};
+
+PassedThrough lead_down(const Scene& scene, int frames) {
+  Simulation simulation(scene);
+  PassedThrough passed;
+  for (int frame = 0; frame < frames; ++frame) {
+    if (!simulation.advance_frame()) {
+      ADD_FAILURE() << simulation.failure();
+      break;
+    }
+    const FrameStats stats = simulation.stats();
+    passed.cuts = stats.cloth_cuts.value_or(-1);
+    passed.most_cuts = std::max(passed.most_cuts, passed.cuts);
+    passed.strain = std::max(passed.strain, stats.largest_strain);
+  }
+  passed.repairs = simulation.repairs().size();
+  return passed;
+}
+
+TEST(HostileScene, APlateThatLeavesASwatchRoomDrawsItDownWithoutACut) {
+  const PassedThrough passed = lead_down(plate_through_swatch(0.03, 0.012), 10);
+  EXPECT_EQ(passed.most_cuts, 0);
+  EXPECT_EQ(passed.repairs, 0U);
+}
+
+TEST(HostileScene, APlateLedThroughTheHeldBorderOfASwatchIsToldAsCutsAndLeavesItCalm) {
+  const PassedThrough passed = lead_down(plate_through_swatch(0, 0.008), 10);
+  EXPECT_GT(passed.cuts, 0);
+  EXPECT_LT(passed.strain, 0.5);
+  EXPECT_LE(passed.repairs, 2U);
+}
+
+TEST(HostileScene, APlateLedThroughAHeldSwatchAtAMetreASecondComesOut) {
+  const PassedThrough passed = lead_down(plate_through_swatch(0, 0.1), 12);
+  EXPECT_GT(passed.most_cuts, 0);
+  EXPECT_EQ(passed.cuts, 0);
+}
+
+TEST(HostileScene, ARimThatShearsASwatchOffItsHeldBorderIsToldAsCuts) {
+  const PassedThrough passed = lead_down(plate_through_swatch(0.00065, 0.008), 10);
+  EXPECT_GT(passed.cuts, 0);
+  EXPECT_LE(passed.repairs, 4U);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/convert/convert.h"
+#include "tests/support/service/assets.h"
 #include "tests/support/service/service.h"
 #include "tests/support/temporary_directory.h"
 
@@ -31,6 +32,7 @@ struct Call {
     kRelease,
     kPin,
     kUnpin,
+    kPose,
     kRelax,
     kSnapshot,
     kRestore,
@@ -46,8 +48,8 @@ struct Call {
 
 std::ostream& operator<<(std::ostream& out, const Call& call) {
   constexpr std::array<const char*, Call::kKinds> kNames = {
-      "create",  "delete", "step",  "run",   "pause",    "set textile", "grab",  "drag",
-      "release", "pin",    "unpin", "relax", "snapshot", "restore",     "again", "restart"};
+      "create", "delete", "step", "run",   "pause",    "set textile", "grab",  "drag",   "release",
+      "pin",    "unpin",  "pose", "relax", "snapshot", "restore",     "again", "restart"};
   return out << kNames[call.kind] << " s" << call.session << ' ' << call.number << " particle "
              << call.particle;
 }
@@ -72,6 +74,7 @@ struct Arbitrary<weft::testing::Call> {
                                                           {2, Call::kRelease},
                                                           {2, Call::kPin},
                                                           {2, Call::kUnpin},
+                                                          {3, Call::kPose},
                                                           {2, Call::kRelax},
                                                           {3, Call::kSnapshot},
                                                           {3, Call::kRestore},
@@ -90,6 +93,18 @@ struct Arbitrary<weft::testing::Call> {
 
 namespace weft::testing {
 namespace {
+
+// A sheet above a cube that two poses lift into it; it stays below until a call leads it.
+v1::Scene sheet_on_cube() {
+  v1::Scene scene = small_scene();
+  v1::MeshData cube = cube_mesh(0.08F, 0.1F, -0.1F, 0.08F);
+  cube.mutable_poses()->add_times_s(10);
+  cube.mutable_poses()->add_times_s(11);
+  cube.mutable_poses()->set_positions_m(cube.positions_m() +
+                                        cube_mesh(0.08F, 0.1F, -0.07F, 0.08F).positions_m());
+  *scene.add_colliders()->mutable_mesh()->mutable_data() = cube;
+  return scene;
+}
 
 // What sessions are when calls are carried out one after the other, by core alone.
 struct Modelled {
@@ -206,7 +221,7 @@ class History {
 
   void create(const std::string& id) {
     v1::CreateSessionRequest request;
-    *request.mutable_session()->mutable_scene() = small_scene();
+    *request.mutable_session()->mutable_scene() = sheet_on_cube();
     request.set_session_id(id);
     if (there_ != nullptr) {
       ask(&Sessions::CreateSession, request, StatusCode::ALREADY_EXISTS, "SESSION_EXISTS");
@@ -340,6 +355,15 @@ class History {
         done.kind = Action::Kind::kPin;
         valid = valid && !pinned;
         break;
+      case Call::kPose:
+        done = {.kind = Action::Kind::kPoseCollider, .pose_time = 10 + 0.3 * call.number};
+        action->mutable_pose_collider()->set_pose_time_s(done.pose_time);
+        if (p >= 0) {
+          done.pose_speed = 0.1 * p;
+          action->mutable_pose_collider()->set_speed_m_per_s(done.pose_speed);
+        }
+        valid = done.pose_time >= 10 && done.pose_time <= 11 && done.pose_speed > 0;
+        break;
       case Call::kRelax:
         action->mutable_relax();
         done = {.kind = Action::Kind::kRelax};
@@ -365,7 +389,7 @@ class History {
   }
 
   static Simulation simulation() {
-    return Simulation(std::get<Scene>(to_scene(small_scene(), "scene")));
+    return Simulation(std::get<Scene>(to_scene(sheet_on_cube(), "scene")));
   }
 
   void keep(int number) {

@@ -101,8 +101,9 @@ void Untangling::add(int edge, int triangle, const Around& around, const Matrix3
 }
 
 void Untangling::lead(std::span<MovingSheet> sheets, double dt) const {
+  constexpr double kLeastMoves = 0.01;  // of its lightest particle's 1 / mass
   for (const Pair& pair : pairs_) {
-    double speed = 0, moves = 0;
+    double speed = 0, moves = 0, lightest = 0;  // m/s; 1/kg
     std::array<double, 5> share{};
     Matrix3Xd x(3, 1), d(3, 1);
     const auto sheet_of = [&](int particle) -> MovingSheet& {
@@ -115,9 +116,11 @@ void Untangling::lead(std::span<MovingSheet> sheets, double dt) const {
       speed += pair.weight[n] * pair.way.dot(d.col(0)) / dt;
       share[n] = pair.weight[n] * sheet.dynamics.inverse_mass[own];
       moves += pair.weight[n] * share[n];
+      lightest = std::max(lightest, sheet.dynamics.inverse_mass[own]);
     }
     const double missing = pair.speed - speed;
-    if (missing <= 0 || moves == 0) continue;
+    // where nearly all is held, what is free would be thrown
+    if (missing <= 0 || moves <= kLeastMoves * lightest) continue;
     x.setZero();
     for (std::size_t n = 0; n < share.size(); ++n) {
       if (share[n] == 0) continue;

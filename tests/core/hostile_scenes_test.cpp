@@ -269,6 +269,15 @@ TEST(HostileScene, APlateLedThroughTheHeldBorderOfASwatchIsToldAsCutsAndLeavesIt
   EXPECT_LE(passed.repairs, 2U);
 }
 
+TEST(HostileScene, WhatCannotComeApartIsNotThrownWhereCutsAreLedApart) {
+  Scene scene = plate_through_swatch(0, 0.008);
+  scene.untangle = 10;
+  const PassedThrough passed = lead_down(scene, 10);
+  EXPECT_GT(passed.cuts, 0);
+  EXPECT_LT(passed.strain, 0.5);
+  EXPECT_LE(passed.repairs, 3U);
+}
+
 TEST(HostileScene, APlateLedThroughAHeldSwatchAtAMetreASecondComesOut) {
   const PassedThrough passed = lead_down(plate_through_swatch(0, 0.1), 12);
   EXPECT_GT(passed.most_cuts, 0);

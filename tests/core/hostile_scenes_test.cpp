@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
 #include <string>
 
 #include "core/motion/guard.h"
@@ -288,6 +291,46 @@ TEST(HostileScene, ARimThatShearsASwatchOffItsHeldBorderIsToldAsCuts) {
   const PassedThrough passed = lead_down(plate_through_swatch(0.00065, 0.008), 10);
   EXPECT_GT(passed.cuts, 0);
   EXPECT_LE(passed.repairs, 4U);
+}
+
+// One to three swatches across each other, some of them held in many places and led at up to
+// 20 m/s.
+Scene random_swatches(unsigned seed) {
+  std::mt19937 random(seed);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<>(low, high)(random);
+  };
+  const auto any_of = [&](int most) { return std::uniform_int_distribution<>(0, most)(random); };
+  const auto way = [&](double length) {
+    return Vector3d(length * Vector3d(between(-1, 1), between(-1, 1), between(-1, 1)).normalized());
+  };
+  Scene scene;
+  scene.cloth_contact = true;
+  for (int count = any_of(2); count >= 0; --count) {
+    SheetDefinition sheet = woollen("swatch-" + std::to_string(count), between(0.03, 0.06));
+    const Vector3d turned = way(between(0, 3));
+    sheet.rotation = Eigen::AngleAxisd(turned.norm(), turned.normalized());
+    sheet.origin = way(0.03);
+    const double share = std::array{0.0, 0.1, 1.0}[static_cast<std::size_t>(any_of(2))];
+    const bool together = any_of(1) == 0;
+    const double speed = std::exp(between(std::log(0.05), std::log(20))), time = between(0.01, 0.1);
+    for (int i = 0; i < sheet.particle_count(); ++i) {
+      if (between(0, 1) > share) continue;
+      if (!together || sheet.pins.empty())
+        sheet.pins.push_back({{}, {{0, Vector3d::Zero()}, {time, way(speed * time)}}});
+      sheet.pins.back().particles.push_back(i);
+    }
+    scene.sheets.push_back(sheet);
+  }
+  return scene;
+}
+
+TEST(HostileScene, SwatchesAcrossEachOtherThatAreHeldAndLedAnywhereStayFinite) {
+  constexpr double kReach = 10;  // m
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE(seed);
+    EXPECT_LE(run(random_swatches(seed), 5, kReach).repairs().size(), 8U);
+  }
 }
 
 }  // namespace

@@ -135,8 +135,9 @@ std::string verdict_text(const v1::Verdict& verdict, const std::vector<v1::Warni
   facts.add("pressure", fmt::format("up to {:.3g} kPa", verdict.largest_pressure_pa() / 1000));
   if (verdict.slid_m() != 0)
     facts.add("slid", fmt::format("{:.0f} mm down", 1000 * verdict.slid_m()));
-  facts.add("cost", fmt::format("{}, {}", count_of(verdict.substep_count(), "substep"),
-                                seconds_text(verdict.computing_s())));
+  facts.add("cost",
+            fmt::format("{}, {} of processors", count_of(verdict.substep_count(), "substep"),
+                        seconds_text(verdict.computing_s())));
   return facts.text();
 }
 

@@ -47,7 +47,7 @@ struct Refusal {
 struct Judgement {
   Verdict verdict;
   std::int64_t substeps = 0;
-  double seconds = 0;  // of computing
+  double seconds = 0;  // of processors, of all threads together
 };
 
 // How a session stood when a command had been carried out.

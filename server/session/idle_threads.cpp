@@ -1,6 +1,7 @@
 #include "server/session/idle_threads.h"
 
 #include <thread>
+#include <utility>
 
 namespace weft {
 namespace {
@@ -16,8 +17,9 @@ void spin_until(const Condition& holds) {
 
 }  // namespace
 
-IdleThreads::IdleThreads(Scheduler& scheduler, int most_threads)
+IdleThreads::IdleThreads(Scheduler& scheduler, int most_threads, std::shared_ptr<HelpedTime> helped)
     : shared_(std::make_shared<Shared>()) {
+  shared_->helped = std::move(helped);
   for (int threads = 1; threads < most_threads; ++threads) {
     if (!scheduler.help([shared = shared_, &scheduler] { help(*shared, scheduler); })) break;
   }
@@ -47,6 +49,7 @@ bool IdleThreads::Shared::take() {
 
 void IdleThreads::help(Shared& shared, const Scheduler& scheduler) {
   ++shared.helpers;
+  const auto begin = thread_time();
   for (bool wanted = true; wanted;) {
     spin_until([&] {
       wanted = !shared.closed && !scheduler.busy();
@@ -54,6 +57,7 @@ void IdleThreads::help(Shared& shared, const Scheduler& scheduler) {
     });
     if (wanted) shared.take();
   }
+  if (shared.helped) *shared.helped += (thread_time() - begin).count();
   --shared.helpers;
 }
 

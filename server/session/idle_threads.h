@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "core/motion/thread_pool.h"
+#include "server/session/processor_time.h"
 #include "server/session/scheduler.h"
 
 namespace weft {
@@ -13,7 +14,8 @@ namespace weft {
 // as something else waits.
 class IdleThreads : public ThreadPool {
  public:
-  IdleThreads(Scheduler& scheduler, int most_threads);
+  // helped: counts their time, where there is one.
+  IdleThreads(Scheduler& scheduler, int most_threads, std::shared_ptr<HelpedTime> helped = {});
   ~IdleThreads() override;
   IdleThreads(const IdleThreads&) = delete;
   IdleThreads& operator=(const IdleThreads&) = delete;
@@ -28,6 +30,7 @@ class IdleThreads : public ThreadPool {
     const std::function<void(int)>* part = nullptr;  // read by who has taken a part
     std::atomic<int> left = 0;                       // parts that nobody has taken, or below
     std::atomic<int> done = 0;                       // parts that are over
+    std::shared_ptr<HelpedTime> helped = {};
 
     bool take();
   };

@@ -35,6 +35,7 @@ Timeline::Timeline(Simulation given, std::int64_t max_frame_work, Duration snaps
 FramePart Timeline::advance(Scheduler& scheduler) {
   constexpr std::chrono::microseconds kSlice{20'000}, kBusySlice = Scheduler::kTurn;
   const auto begin = Clock::now();
+  const auto processor = thread_time();
   auto yielded = begin;
   const Enough enough = [&] {
     const auto now = Clock::now();
@@ -50,23 +51,30 @@ FramePart Timeline::advance(Scheduler& scheduler) {
   if (most_threads == 1) {
     part = simulation.advance_frame(enough);
   } else {
-    IdleThreads pool(scheduler, most_threads);
+    IdleThreads pool(scheduler, most_threads, helped_);
     part = simulation.advance_frame(enough, pool);
   }
   const Duration time = Clock::now() - begin;
   work_ += time;
   frame_work_ += time;
+  frame_processor_ += thread_time() - processor;
   return part;
+}
+
+Judgement Timeline::judge() const {
+  const Duration helped = std::chrono::nanoseconds(helped_->load());
+  return {simulation.verdict(), substeps_, (processor_ + helped).count()};
 }
 
 void Timeline::count_frame(Stats& stats) {
   const Duration time = std::exchange(frame_work_, {});
+  const Duration processor = std::exchange(frame_processor_, {});
   ++stats.frames;
   if (simulation.substeps() == 0) {
     ++stats.sleeping_frames;
     return;
   }
-  computing_ += time;
+  processor_ += processor;
   substeps_ += simulation.substeps();
   stats.substeps += simulation.substeps();
   stats.particle_substeps += simulation.substeps() * simulation.particle_count();
@@ -75,7 +83,7 @@ void Timeline::count_frame(Stats& stats) {
 
 bool Timeline::drop_frame() {
   if (!simulation.drop_frame()) return false;
-  frame_work_ = {};
+  frame_work_ = frame_processor_ = {};
   return true;
 }
 

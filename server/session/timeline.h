@@ -9,6 +9,7 @@
 #include "core/simulation.h"
 #include "server/session/command.h"
 #include "server/session/frame.h"
+#include "server/session/processor_time.h"
 #include "server/session/scheduler.h"
 #include "server/session/snapshot.h"
 #include "server/session/stats.h"
@@ -29,7 +30,7 @@ class Timeline {
   FramePart advance(Scheduler& scheduler);
   // Counts the frame that is done.
   void count_frame(Stats& stats);
-  Judgement judge() const { return {simulation.verdict(), substeps_, computing_.count()}; }
+  Judgement judge() const;
   // Takes back the frame under way; false where it cannot be.
   [[nodiscard]] bool drop_frame();
   // read: somebody waits for it, and will want to know of its energy and strain, which else are
@@ -53,10 +54,12 @@ class Timeline {
   const Duration snapshot_after_;
   Duration work_{};                       // since the last snapshot
   Duration frame_work_{};                 // of the frame under way
+  Duration frame_processor_{};            // the same, of the processor
   std::int64_t entries_in_snapshot_ = 0;  // the last one
-  Duration computing_{};                  // of all frames
-  std::int64_t substeps_ = 0;             // of all frames
-  std::shared_ptr<FrameMeter> meter_;     // of all frames
+  Duration processor_{};                  // of all frames, without that of threads that helped
+  std::shared_ptr<HelpedTime> helped_ = std::make_shared<HelpedTime>(0);
+  std::int64_t substeps_ = 0;          // of all frames
+  std::shared_ptr<FrameMeter> meter_;  // of all frames
 };
 
 }  // namespace weft

@@ -1,6 +1,7 @@
 #include "server/session/stats.h"
 
 #include <chrono>
+#include <ctime>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -50,6 +51,21 @@ TEST(ServerStats, CountWhatWasComputedAndSent) {
   std::int64_t timed = 0;
   for (const std::int64_t count : stats.frame_time_s().counts()) timed += count;
   EXPECT_EQ(timed, 10);
+}
+
+TEST(Verdict, TellsWhatASessionTookOfTheProcessors) {
+  Service service;
+  const std::clock_t begin = std::clock();  // of all threads
+  const v1::Session session = service.create();
+  service.step(session, 100);
+  v1::GetVerdictRequest request;
+  request.set_name(session.name());
+  v1::Verdict verdict;
+  ASSERT_TRUE(service.call(&Service::Sessions::GetVerdict, request, &verdict).ok());
+  const double took = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  EXPECT_EQ(verdict.substep_count(), 100 * session.plan().substeps_per_frame());
+  EXPECT_GT(verdict.computing_s(), 0);
+  EXPECT_LE(verdict.computing_s(), took);
 }
 
 TEST(ServerStats, SayWhatFramesTakeWhichAllSessionsTogetherKeepWithinTheirBound) {

@@ -150,7 +150,9 @@ void ClothContact::find_near(ThreadPool& pool) {
 void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPool& pool) {
   find_near(pool);
   const Separation::Ways ways{begin_, x_, d_, inverse_mass_};
-  separation_.touch(near_, untangling_, ways, PairLists::kMostMotion * cloth_.thickest, pool);
+  const int others = std::max(1, static_cast<int>(scene_.sheets.size()) - 1);
+  separation_.touch(near_, untangling_, ways, PairLists::kMostMotion * cloth_.thickest, others,
+                    pool);
   if (separation_.empty()) return separation_.forget_given();
   has_met_ = true;
   const double steps =

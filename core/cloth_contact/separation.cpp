@@ -27,9 +27,9 @@ std::size_t hash(const std::array<int, 4>& particle) {
 }  // namespace
 
 void Separation::touch(std::span<const NearCloth> near, const Untangling& untangling,
-                       const Ways& ways, double most, ThreadPool& pool) {
+                       const Ways& ways, double most, int layers, ThreadPool& pool) {
   constexpr std::int64_t kLeastShare = 64;  // lists, of a thread
-  const Surroundings around{untangling, ways, most};
+  const Surroundings around{untangling, ways, most, static_cast<double>(layers)};
   const std::size_t shares = shares_of(pool, std::ssize(near), kLeastShare);
   found_.resize(2 * shares);
   for (const bool edges : {false, true})
@@ -92,10 +92,9 @@ void Separation::touch(bool edges, std::span<const NearCloth> near, const Surrou
 void Separation::add(bool edges, const Candidate& candidate, const std::array<double, 4>& weight,
                      const Vector3d& apart, double distance, double friction,
                      const Surroundings& around, Found& found) {
-  constexpr double kLeastReach = 0.02;  // of the thickness, where things nearly touch
-  constexpr double kLeastMoves = 0.01;  // of its lightest particle's 1 / mass
-  // of the thickness; in heaps and stacks that fall a pair gives up to half of it
-  constexpr double kMostGiven = 1, kMostGivenIfHeld = 0.1;
+  constexpr double kLeastReach = 0.02;      // of the thickness, where things nearly touch
+  constexpr double kLeastMoves = 0.01;      // of its lightest particle's 1 / mass
+  constexpr double kMostGivenIfHeld = 0.1;  // of the thickness
   // of all of the one to all of the other, m^2
   const auto farthest = [&](Eigen::Vector4d (Ways::*motion)(int) const) {
     std::array<Eigen::Vector4d, 4> by;
@@ -139,7 +138,7 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   contact.thickness = candidate.thickness;
   contact.friction = friction;
   contact.most_given =
-      (is_held[0] && is_held[1] ? kMostGivenIfHeld : kMostGiven) * candidate.thickness;
+      (is_held[0] && is_held[1] ? kMostGivenIfHeld : around.layers) * candidate.thickness;
 }
 
 // Has the particles of all contacts begin with their own ways.

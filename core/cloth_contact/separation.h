@@ -58,8 +58,9 @@ class Separation {
   };
   // Finds the candidates that may have come nearer than their thickness on their way, as far as
   // they came less far than `most` (m) in relation to each other, without those that are led apart.
+  // layers: how many may fall onto one, which gives for all, as many thicknesses at most.
   void touch(std::span<const NearCloth> near, const Untangling& untangling, const Ways& ways,
-             double most, ThreadPool& pool);
+             double most, int layers, ThreadPool& pool);
   bool empty() const {
     return std::ranges::all_of(found_, [](const Found& found) { return found.contacts.empty(); });
   }
@@ -101,7 +102,7 @@ class Separation {
   struct Surroundings {
     const Untangling& untangling;
     const Ways& ways;
-    double most;
+    double most, layers;
   };
   struct Found {
     std::vector<Contact> contacts;

@@ -293,6 +293,24 @@ TEST(HostileScene, ARimThatShearsASwatchOffItsHeldBorderIsToldAsCuts) {
   EXPECT_LE(passed.repairs, 4U);
 }
 
+TEST(HostileScene, TwentyLayersThatFallTogetherOntoAHeldOneAreStopped) {
+  SheetDefinition base = woollen("base", 0.06);
+  Pin& all = base.pins.emplace_back();
+  for (int i = 0; i < base.particle_count(); ++i) all.particles.push_back(i);
+  Scene scene;
+  scene.sheets = {base};
+  scene.cloth_contact = true;
+  scene.environment.gravity = kGravity;
+  for (int layer = 0; layer < 20; ++layer) {
+    SheetDefinition& sheet =
+        scene.sheets.emplace_back(woollen("layer-" + std::to_string(layer), 0.04));
+    sheet.origin = {0.01 + 2e-4 * layer, 0.8 + 0.00205 * layer, 0.01 + 1e-4 * layer};
+  }
+  const PassedThrough passed = lead_down(scene, 30);  // they meet in frame 25 at 4 m/s
+  EXPECT_EQ(passed.most_cuts, 0);
+  EXPECT_EQ(passed.repairs, 0U);
+}
+
 // One to three swatches across each other, some of them held in many places and led at up to
 // 20 m/s.
 Scene random_swatches(unsigned seed) {

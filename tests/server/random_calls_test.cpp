@@ -94,17 +94,8 @@ struct Arbitrary<weft::testing::Call> {
 namespace weft::testing {
 namespace {
 
-// A sheet above a cube that two poses lift into it; it stays below until a call leads it.
-v1::Scene sheet_on_cube() {
-  v1::Scene scene = small_scene();
-  v1::MeshData cube = cube_mesh(0.08F, 0.1F, -0.1F, 0.08F);
-  cube.mutable_poses()->add_times_s(10);
-  cube.mutable_poses()->add_times_s(11);
-  cube.mutable_poses()->set_positions_m(cube.positions_m() +
-                                        cube_mesh(0.08F, 0.1F, -0.07F, 0.08F).positions_m());
-  *scene.add_colliders()->mutable_mesh()->mutable_data() = cube;
-  return scene;
-}
+// The cube stays below the sheet until a call leads it into it.
+v1::Scene sheet_on_cube() { return posed_scene(0.08F, -0.1F, 0.03F); }
 
 // What sessions are when calls are carried out one after the other, by core alone.
 struct Modelled {

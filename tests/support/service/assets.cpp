@@ -77,13 +77,13 @@ v1::Scene scene_of(const std::string& asset) {
   return scene;
 }
 
-v1::Scene posed_scene() {
+v1::Scene posed_scene(float half, float height, float lift) {
   v1::Scene scene = small_scene();
-  v1::MeshData cube = cube_mesh(0.1F, 0.1F, -2, 0.1F);
+  v1::MeshData cube = cube_mesh(half, 0.1F, height, 0.1F);
   cube.mutable_poses()->add_times_s(10);
   cube.mutable_poses()->add_times_s(11);
   cube.mutable_poses()->set_positions_m(cube.positions_m() +
-                                        cube_mesh(0.1F, 0.1F, -1.8F, 0.1F).positions_m());
+                                        cube_mesh(half, 0.1F, height + lift, 0.1F).positions_m());
   *scene.add_colliders()->mutable_mesh()->mutable_data() = cube;
   return scene;
 }

@@ -20,8 +20,9 @@ v1::MeshData cube_mesh(float half, float x, float y, float z);
 // A sheet of the mesh, held by its first particle. By itself, or by the name of an asset.
 v1::Scene scene_of(const v1::MeshData& mesh);
 v1::Scene scene_of(const std::string& asset);
-// small_scene() far above a cube, which moves by 0.2 m/s from its pose at 10 s to that at 11 s.
-v1::Scene posed_scene();
+// small_scene() and a cube whose middle is at that height, m, in its pose at 10 s, and is lifted in
+// that at 11 s; far below, unless asked otherwise.
+v1::Scene posed_scene(float half = 0.1F, float height = -2, float lift = 0.2F);
 
 // "assets/{hash}".
 std::string name_of_asset(const std::string& bytes);

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/contact/body.h"
 #include "core/simulation.h"
 #include "core/triangles/cut.h"
 
@@ -51,7 +52,15 @@ Scene rough_scene(const std::vector<BendingLaw>& laws) {
   return scene;
 }
 
-// Two sheets that pass through each other, of which the seams of one close.
+// Of triangles.
+Collider rough_body() {
+  const BodyMesh mesh{
+      {{0, -0.02, -0.01}, {0.05, -0.02, 0}, {0.02, -0.02, 0.06}, {0.02, 0.004, 0.02}},
+      {{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}};
+  return {"body", make_body(mesh, {.cell = 2e-3, .reach = 2e-3}, "body").body, 0.3, {}};
+}
+
+// Two sheets that pass through each other, of which the seams of one close, on a deflated body.
 Scene dressed_scene() {
   Scene scene = rough_scene({});
   for (const SheetShape& shape : {rough_mesh(), SheetShape(Grid{3, 5, 0.01})})
@@ -60,6 +69,7 @@ Scene dressed_scene() {
   for (std::size_t i = 1; i < start.size(); i += 3) start[i] += 0.2 * (start[i - 1] - 0.01);
   std::vector<double>& open = scene.sheets[0].start_positions;
   open[open.size() - 3] += 0.02;
+  scene.colliders.push_back(rough_body());
   scene.cloth_contact = true;
   for (SheetDefinition& sheet : scene.sheets) sheet.textile.damping_ratio = 0.02;
   scene.solver.step_bound = StepBound::kUnsheared;

@@ -212,6 +212,17 @@ Distance Contacts::nearest(const Vector3d& x) const {
   return nearest;
 }
 
+double Contacts::gap(const Vector3d& x) const {
+  double least = kInfinite;
+  for (const Placed& each : placed_) {
+    const double value = distance_at(each, 0, x).value;
+    double beyond = value - skin_;
+    if (jumps(each)) beyond = std::min(beyond, std::max(value, 0.0));
+    least = std::min(least, beyond / each.steepest);
+  }
+  return least;
+}
+
 // Of the step, for a particle that could have met a collider in it.
 int Contacts::parts(const Vector3d& x, const Vector3d& d) const {
   constexpr double kMost = 1e4;

@@ -63,7 +63,12 @@ class Contacts {
   // How far a point is from the nearest skin at the end of the step, m, or less; negative inside;
   // and the direction out of that collider.
   Distance nearest(const Vector3d& x) const;
-  double gap(const Vector3d& x) const { return nearest(x).value; }
+  // How far a particle may come before it touches a skin, m, or less; negative inside.
+  double gap(const Vector3d& x) const;
+  // Whether a collider is a deflated body of triangles, whose skin lies where blocks of its grid
+  // have eight values each: distances jump from one to the next, and what is inside the body as it
+  // is given may touch the skin wherever it goes.
+  bool jumps(const Placed& placed) const { return placed.steepest > 1 && skin_ < 0; }
   // Moves a particle that is closer to a collider than the skin out to it, inelastically, and slows
   // its sliding by Coulomb friction. Where it could have crossed one in the step, it meets them in
   // parts of the step, in each of which it comes no farther than a quarter of the thickness. What

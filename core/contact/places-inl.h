@@ -131,6 +131,41 @@ HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point) {
   return {first, row, layer, minus(in_block, cell), hn::Mul(hn::Sqrt(squared(away)), real(edge))};
 }
 
+HWY_INLINE Reals between(Reals a, Reals b, Reals share) {
+  return hn::MulAdd(hn::Sub(b, a), share, a);
+}
+
+// Along x, from two neighbours, read at once.
+struct AlongX {
+  Reals value, slope;
+};
+HWY_INLINE AlongX along_x(const float* values, Reals from, Reals share) {
+  const ContactTag tag;
+  const hn::Rebind<std::int32_t, ContactTag> ints;
+  const hn::Rebind<float, ContactTag> floats;
+  const hn::Rebind<std::uint32_t, ContactTag> words;
+  const hn::RebindToSigned<ContactTag> offsets;
+  const hn::RebindToUnsigned<ContactTag> pairs;
+  const auto bytes = hn::ShiftLeft<2>(hn::PromoteTo(offsets, hn::DemoteTo(ints, from)));
+  const auto pair = hn::GatherOffset(pairs, reinterpret_cast<const std::uint64_t*>(values), bytes);
+  const Reals a = hn::PromoteTo(tag, hn::BitCast(floats, hn::TruncateTo(words, pair)));
+  const Reals b =
+      hn::PromoteTo(tag, hn::BitCast(floats, hn::TruncateTo(words, hn::ShiftRight<32>(pair))));
+  const Reals slope = hn::Sub(b, a);
+  return {hn::MulAdd(slope, share, a), slope};
+}
+
+struct AcrossY {
+  Reals value, x, y;
+};
+HWY_INLINE AcrossY across_y(const float* values, Reals from, const InGrids& at) {
+  const AlongX low = along_x(values, from, at.share.x),
+               high = along_x(values, hn::Add(from, at.row), at.share.x);
+  const Reals slope = hn::Sub(high.value, low.value);
+  return {hn::MulAdd(slope, at.share.y, low.value), between(low.slope, high.slope, at.share.y),
+          slope};
+}
+
 struct BetweenCorners {
   Reals value;
   Places slope;
@@ -138,39 +173,8 @@ struct BetweenCorners {
 
 // Between the values at the corners of cells.
 HWY_INLINE BetweenCorners between_corners(const float* values, const InGrids& at) {
-  const ContactTag tag;
-  const hn::Rebind<std::int32_t, ContactTag> ints;
-  const hn::Rebind<float, ContactTag> floats;
-  const hn::Rebind<std::uint32_t, ContactTag> words;
-  const hn::RebindToSigned<ContactTag> offsets;
-  const hn::RebindToUnsigned<ContactTag> pairs;
-  const auto between = [](Reals a, Reals b, Reals s)
-                           HWY_ATTR { return hn::MulAdd(hn::Sub(b, a), s, a); };
-  struct Line {
-    Reals value, slope;
-  };
-  const auto along_x = [&](Reals from) HWY_ATTR {
-    // two neighbours at a time
-    const auto bytes = hn::ShiftLeft<2>(hn::PromoteTo(offsets, hn::DemoteTo(ints, from)));
-    const auto pair =
-        hn::GatherOffset(pairs, reinterpret_cast<const std::uint64_t*>(values), bytes);
-    const auto read = [&](auto v) HWY_ATTR {
-      return hn::PromoteTo(tag, hn::BitCast(floats, hn::TruncateTo(words, v)));
-    };
-    const Reals a = read(pair), b = read(hn::ShiftRight<32>(pair));
-    const Reals slope = hn::Sub(b, a);
-    return Line{hn::MulAdd(slope, at.share.x, a), slope};
-  };
-  struct Face {
-    Reals value, x, y;
-  };
-  const auto across_y = [&](Reals from) HWY_ATTR {
-    const Line low = along_x(from), high = along_x(hn::Add(from, at.row));
-    const Reals slope = hn::Sub(high.value, low.value);
-    return Face{hn::MulAdd(slope, at.share.y, low.value),
-                between(low.slope, high.slope, at.share.y), slope};
-  };
-  const Face low = across_y(at.first), high = across_y(hn::Add(at.first, at.layer));
+  const AcrossY low = across_y(values, at.first, at),
+                high = across_y(values, hn::Add(at.first, at.layer), at);
   return {between(low.value, high.value, at.share.z),
           {between(low.x, high.x, at.share.z), between(low.y, high.y, at.share.z),
            hn::Sub(high.value, low.value)}};
@@ -233,7 +237,8 @@ struct Gaps {
 };
 HWY_INLINE Gaps gaps(const Contacts& contacts, const Places& x) {
   const auto gap = [&](const Contacts::Placed& placed, Reals value) HWY_ATTR {
-    const Reals beyond = hn::Sub(value, real(contacts.skin()));
+    Reals beyond = hn::Sub(value, real(contacts.skin()));
+    if (contacts.jumps(placed)) beyond = hn::Min(beyond, hn::Max(value, real(0)));
     return placed.steepest == 1 ? beyond : hn::Div(beyond, real(placed.steepest));
   };
   const auto placed = contacts.placed();

@@ -27,7 +27,7 @@ class LatticeSolver : public SheetSolver {
         damping_(sheet.textile.damping.value_or(kDefaultDamping)),
         law_(make_sweep_law<T>(sheet)),
         state_(law_.layout, compensated, static_cast<T>(lead_of(integrator))),
-        gaps_(static_cast<std::size_t>(law_.layout.rows)) {
+        gaps_(static_cast<std::size_t>(law_.layout.rows), 1) {
     law_.compensated = compensated;
     if (wind) law_.wind = make_wind_law<T>(*wind);
   }

@@ -9,11 +9,12 @@
 
 namespace weft {
 
-// How far the parts of a sheet, such as rows, are from the nearest skin. A part is looked at again
-// when it, or a collider, may have come as far as its gap was wide.
+// How far the parts of a sheet are from the nearest skin. A part is looked at again when it, or a
+// collider, may have come as far as its gap was wide.
 class Gaps {
  public:
-  explicit Gaps(std::size_t parts) : gap_(parts) {}
+  // So many parts in a row are saved as one.
+  explicit Gaps(std::size_t parts, std::ptrdiff_t together) : gap_(parts), together_(together) {}
 
   // Every part is to be looked at.
   void forget() {
@@ -52,16 +53,21 @@ class Gaps {
   std::size_t parts() const { return gap_.size(); }
   void save(SavedValues& saved) const {
     saved.put(come_);
-    saved.put(gap_.data(), gap_.size());
+    for (auto first = gap_.begin(); first != gap_.end(); first += together_)
+      saved.put(*std::min_element(first, first + together_));
   }
   void load(LoadedValues& loaded) {
     loaded.take(&come_, 1);
-    loaded.take(gap_.data(), gap_.size());
+    for (auto first = gap_.begin(); first != gap_.end(); first += together_) {
+      loaded.take(&*first, 1);
+      std::fill(first, first + together_, *first);
+    }
     least_ = *std::min_element(gap_.begin(), gap_.end());
   }
 
  private:
-  std::vector<double> gap_;      // of each part, at least, m
+  std::vector<double> gap_;  // of each part, at least, m
+  std::ptrdiff_t together_;
   double least_ = 0, come_ = 0;  // of all parts; how far they may have come since, m
   std::vector<int> near_;
 };

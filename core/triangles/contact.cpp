@@ -18,10 +18,6 @@ struct Lanes {
   static constexpr std::size_t kMost = hn::MaxLanes(ContactTag());
   HWY_ALIGN double axis[3][kMost];
 
-  HWY_INLINE Places load() const {
-    const ContactTag d;
-    return {hn::Load(d, axis[0]), hn::Load(d, axis[1]), hn::Load(d, axis[2])};
-  }
   HWY_INLINE void store(const Places& places) {
     const ContactTag d;
     hn::Store(places.x, d, axis[0]);
@@ -30,30 +26,35 @@ struct Lanes {
   }
 };
 
+// Of vectors of four values each: the first three of every particle.
 template <class T>
-double resolve_block_as(const Contacts& contacts, const Vector3d& origin, bool compensated,
-                        int block, TriangleState<T>& state) {
+HWY_INLINE Places load_places(const T* from) {
+  const hn::Rebind<T, ContactTag> stored;
+  hn::Vec<decltype(stored)> x, y, z, rest;
+  hn::LoadInterleaved4(stored, from, x, y, z, rest);
+  if constexpr (sizeof(T) == sizeof(double))
+    return {x, y, z};
+  else
+    return {hn::PromoteTo(ContactTag(), x), hn::PromoteTo(ContactTag(), y),
+            hn::PromoteTo(ContactTag(), z)};
+}
+
+template <class T>
+double resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                      TriangleState<T>& state) {
   const ContactTag d;
   const Reals far = real(std::numeric_limits<double>::infinity());
-  constexpr std::size_t kBlock = TriangleLaw<T>::kBlock, kValues = 4;
-  const std::size_t begin = static_cast<std::size_t>(block) * kBlock * kValues;
+  constexpr std::size_t kValues = 4;
+  static_assert(kContactRun % Lanes::kMost == 0);
+  const std::size_t begin = static_cast<std::size_t>(run) * kContactRun * kValues;
   Reals nearest = far;
-  for (std::size_t first = begin; first < begin + kBlock * kValues;
+  for (std::size_t first = begin; first < begin + kContactRun * kValues;
        first += kValues * Lanes::kMost) {
     const auto exact = [&](const AlignedArray<T>& plane, const AlignedArray<T>& error) HWY_ATTR {
-      Lanes lanes;
-      for (std::size_t k = 0; k < Lanes::kMost; ++k)
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          const std::size_t i = first + k * kValues + axis;
-          lanes.axis[axis][k] =
-              compensated ? double{plane.data()[i]} - double{error.data()[i]} : plane.data()[i];
-        }
-      return lanes.load();
+      const Places rounded = load_places(plane.data() + first);
+      return compensated ? minus(rounded, load_places(error.data() + first)) : rounded;
     };
-    HWY_ALIGN double mobile[Lanes::kMost];
-    for (std::size_t k = 0; k < Lanes::kMost; ++k) mobile[k] = state.step2.data()[first + k * 4];
-
-    const auto free = hn::Gt(hn::Load(d, mobile), real(0));
+    const auto free = hn::Gt(load_places(state.step2.data() + first).x, real(0));
     Places x = plus(everywhere(origin), exact(state.x, state.x_error));
     const Gaps found = gaps(contacts, x);
     const Reals gap = hn::IfThenElse(free, found.least, far);
@@ -88,13 +89,13 @@ double resolve_block_as(const Contacts& contacts, const Vector3d& origin, bool c
   return hn::GetLane(hn::MinOfLanes(d, nearest));
 }
 
-double resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int block,
+double resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
                       TriangleState<float>& state) {
-  return resolve_block_as(contacts, origin, compensated, block, state);
+  return resolve_run_as(contacts, origin, compensated, run, state);
 }
-double resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int block,
+double resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
                       TriangleState<double>& state) {
-  return resolve_block_as(contacts, origin, compensated, block, state);
+  return resolve_run_as(contacts, origin, compensated, run, state);
 }
 
 }  // namespace weft::HWY_NAMESPACE
@@ -107,14 +108,14 @@ HWY_EXPORT(resolve_single);
 HWY_EXPORT(resolve_double);
 
 template <>
-double resolve_block(const Contacts& contacts, const Vector3d& origin, bool compensated, int block,
-                     TriangleState<float>& state) {
-  return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, block, state);
+double resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                   TriangleState<float>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, run, state);
 }
 template <>
-double resolve_block(const Contacts& contacts, const Vector3d& origin, bool compensated, int block,
-                     TriangleState<double>& state) {
-  return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, block, state);
+double resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                   TriangleState<double>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, run, state);
 }
 
 }  // namespace weft

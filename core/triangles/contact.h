@@ -5,10 +5,14 @@
 
 namespace weft {
 
-// Contacts::resolve() for the free particles of a block, in vectors of double. `origin` is what
-// positions are relative to, m. Returns how far the nearest of them was from a skin, m.
+// Particles, in the order of memory, whose contact is resolved together.
+inline constexpr std::size_t kContactRun = 8;
+
+// Contacts::resolve() for the free particles of a run, in vectors of double. `origin` is what
+// positions are relative to, m. Returns how far the nearest of them was from a skin, m: below 0
+// where one was moved.
 template <class T>
-double resolve_block(const Contacts& contacts, const Vector3d& origin, bool compensated, int block,
-                     TriangleState<T>& state);
+double resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                   TriangleState<T>& state);
 
 }  // namespace weft

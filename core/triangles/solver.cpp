@@ -1,6 +1,7 @@
 #include "core/triangles/solver.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -26,7 +27,7 @@ class TriangleSolver : public SheetSolver {
         particles_(static_cast<int>(mesh.mass.size())),
         law_(std::move(law)),
         state_(particles_, compensated, static_cast<T>(lead_of(integrator))),
-        gaps_(static_cast<std::size_t>(law_.blocks())) {
+        gaps_(static_cast<std::size_t>(law_.blocks()) * kRunsOfBlock, kRunsOfBlock) {
     law_.compensated = compensated;
     law_.drags = dynamics.drag.size() > 0;
     if (wind) law_.wind = make_wind_law<T>(*wind);
@@ -91,20 +92,20 @@ class TriangleSolver : public SheetSolver {
 
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
-    const bool in_parts = contacts.may_cross(moved_);
-    gaps_.look(moved_ + contacts.reach(), bands(pool), pool, [&](int block) {
-      const std::vector<Vector3d> before =
-          measures_ ? positions_in(block) : std::vector<Vector3d>();
-      const double gap = in_parts
-                             ? resolve_in_parts(contacts, block)
-                             : resolve_block(contacts, origin_, law_.compensated, block, state_);
-      if (measures_) pushes_[static_cast<std::size_t>(block)] = farthest_from(before, block);
+    const bool may_cross = contacts.may_cross(moved_);
+    gaps_.look(moved_ + contacts.reach(), bands(pool), pool, [&](int run) {
+      const Positions before = measures_ ? positions_in(run) : Positions();
+      const double gap = may_cross ? resolve_in_parts(contacts, run)
+                                   : resolve_run(contacts, origin_, law_.compensated, run, state_);
+      if (measures_)
+        pushes_[static_cast<std::size_t>(run)] =
+            gap < 0 || may_cross ? farthest_from(before, run) : 0;
       return gap;
     });
     pushed_ = 0;
     if (measures_)
-      for (const int block : gaps_.looked_at())
-        pushed_ = std::max(pushed_, pushes_[static_cast<std::size_t>(block)]);
+      for (const int run : gaps_.looked_at())
+        pushed_ = std::max(pushed_, pushes_[static_cast<std::size_t>(run)]);
   }
 
   void measure() override {
@@ -194,6 +195,8 @@ class TriangleSolver : public SheetSolver {
   }
 
  private:
+  static constexpr std::size_t kRunsOfBlock = TriangleLaw<T>::kBlock / kContactRun;
+
   // What planes are saved; no kind of a lattice's.
   int kind() const {
     return 1 << 16 | law_.drags << 5 | law_.compensated << 4 | static_cast<int>(sizeof(T));
@@ -273,11 +276,11 @@ class TriangleSolver : public SheetSolver {
           static_cast<T>(values[static_cast<Eigen::Index>(axis)]);
   }
 
-  // As resolve_block(), where particles may come through colliders unseen.
-  double resolve_in_parts(const Contacts& contacts, int block) {
-    constexpr std::size_t kValues = 4 * TriangleLaw<T>::kBlock;
+  // As resolve_run(), where particles may come through colliders unseen.
+  double resolve_in_parts(const Contacts& contacts, int run) {
+    constexpr std::size_t kValues = 4 * kContactRun;
     double nearest = std::numeric_limits<double>::infinity();
-    const std::size_t begin = static_cast<std::size_t>(block) * kValues;
+    const std::size_t begin = static_cast<std::size_t>(run) * kValues;
     for (std::size_t at = begin; at < begin + kValues; at += 4) {
       if (state_.step2.data()[at] == 0) continue;
       Vector3d x = position_at(at);
@@ -296,18 +299,18 @@ class TriangleSolver : public SheetSolver {
     return nearest;
   }
 
-  std::vector<Vector3d> positions_in(int block) const {
-    std::vector<Vector3d> x;
-    const std::size_t begin = static_cast<std::size_t>(block) * 4 * TriangleLaw<T>::kBlock;
-    for (std::size_t k = 0; k < TriangleLaw<T>::kBlock; ++k)
-      x.push_back(position_at(begin + 4 * k));
+  using Positions = std::array<Vector3d, kContactRun>;
+  Positions positions_in(int run) const {
+    Positions x;
+    const std::size_t begin = 4 * kContactRun * static_cast<std::size_t>(run);
+    for (std::size_t k = 0; k < kContactRun; ++k) x[k] = position_at(begin + 4 * k);
     return x;
   }
-  double farthest_from(const std::vector<Vector3d>& before, int block) const {
-    const std::size_t begin = static_cast<std::size_t>(block) * 4 * TriangleLaw<T>::kBlock;
+  double farthest_from(const Positions& before, int run) const {
+    const Positions now = positions_in(run);
     double squared = 0;
-    for (std::size_t k = 0; k < TriangleLaw<T>::kBlock; ++k)
-      squared = std::max(squared, (position_at(begin + 4 * k) - before[k]).squaredNorm());
+    for (std::size_t k = 0; k < kContactRun; ++k)
+      squared = std::max(squared, (now[k] - before[k]).squaredNorm());
     return std::sqrt(squared);
   }
 
@@ -320,13 +323,13 @@ class TriangleSolver : public SheetSolver {
   bool started_ = false;
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
   double moved_ = 0;                    // farthest displacement of the last step, at most, m
-  Gaps gaps_;                           // of blocks
+  Gaps gaps_;                           // of runs
   std::vector<Hinge> hinges_;           // by numbers in hinged_
   std::vector<int> hinged_;             // particles
   Matrix3Xd hinged_x_, hinged_force_;   // of these, m and N
   double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
   bool measures_ = false;               // pushed_
-  std::vector<double> pushes_;          // the same of each block when last looked at, m
+  std::vector<double> pushes_;          // the same of each run when last looked at, m
 };
 
 template <class T>

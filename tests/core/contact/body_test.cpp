@@ -229,6 +229,26 @@ TEST(Bodies, ThatAreFarAreSkippedWithoutMissingAContact) {
   }
 }
 
+// Deep inside, where the skin of a deflated body is, distances jump.
+TEST(Bodies, ThatAreDeflatedAreSkippedWithoutMissingAContact) {
+  const std::vector<Collider> bodies{solid(box_mesh({0.15, 0.1, 0.12}))};
+  const Contacts contacts(bodies, MovingBodies(bodies), 0.3, 1e-3, 0, 1e-3, 0.01);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> place(-0.16, 0.16), part(-1, 1);
+  const auto anywhere = [&](auto& from) {
+    return Vector3d(from(random), from(random), from(random));
+  };
+  int far = 0;
+  for (int i = 0; i < 1'000'000; ++i) {
+    const Vector3d x = anywhere(place);
+    const double gap = contacts.gap(x);
+    if (!(gap > 0)) continue;
+    EXPECT_GE(contacts.gap(x + gap * anywhere(part).normalized()), 0) << x;
+    ++far;
+  }
+  EXPECT_GT(far, 10'000);
+}
+
 TEST(Bodies, GiveTheSameBitsAfterASnapshot) {
   const Scene scene = falling_on({moved(solid(ball_mesh(0.1, 2)), {0, -0.11, 0})});
   Simulation one(scene), other(scene);

@@ -49,6 +49,12 @@ class Contacts {
     const PosedBody* posed = nullptr;  // between poses; offset and carried are of its middle then
   };
   std::span<const Placed> placed() const { return placed_; }
+  // Of the first collider, where it is a body of triangles in the shape that it is given in; or
+  // none.
+  const DistanceGrid* first_grid() const {
+    const auto* body = std::get_if<SharedBody>(&placed_.front().collider.shape);
+    return body != nullptr && placed_.front().posed == nullptr ? &(*body)->grid : nullptr;
+  }
   // Of the textile, from colliders as they are given: less than nothing where they are deflated.
   double skin() const { return skin_; }
   // A body may push a particle into another one: so many rounds at most, until one moves it by no

@@ -8,10 +8,12 @@
 
 #include <hwy/highway.h>
 
+#include <array>
 #include <cstdint>
 #include <limits>
 
 #include "core/contact/contact.h"
+#include "core/contact/known_cells.h"
 #include "core/motion/vectors-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -20,6 +22,10 @@ namespace weft::HWY_NAMESPACE {
 using ContactTag = hn::ScalableTag<double>;
 using Reals = hn::Vec<ContactTag>;
 using Places = Triple<Reals>;
+using Ints = hn::Rebind<std::int32_t, ContactTag>;
+using Blocks = hn::Vec<Ints>;
+using FloatTag = hn::Rebind<float, ContactTag>;
+using Floats = hn::Vec<FloatTag>;
 
 HWY_INLINE Reals real(double value) { return hn::Set(ContactTag(), value); }
 HWY_INLINE Places everywhere(const Vector3d& v) { return {real(v[0]), real(v[1]), real(v[2])}; }
@@ -99,9 +105,9 @@ struct InGrids {
   Reals beyond;
 };
 
-HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point) {
-  const ContactTag tag;
-  const hn::Rebind<std::int32_t, ContactTag> ints;
+// begin_of: where the values of blocks begin, by their index.
+template <class F>
+HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point, const F& begin_of) {
   constexpr double kBlock = DistanceGrid::kBlock;
   const double edge = kBlock * grid.cell;
   const Reals zero = real(0), one = real(1);
@@ -117,8 +123,7 @@ HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point) {
                          HWY_ATTR { return hn::Min(hn::Floor(v), hn::Sub(end, one)); };
   const Places block{whole(inside.x, most.x), whole(inside.y, most.y), whole(inside.z, most.z)};
   const Reals index = hn::MulAdd(hn::MulAdd(block.z, most.y, block.y), most.x, block.x);
-  const Reals begin =
-      hn::PromoteTo(tag, hn::GatherIndex(ints, grid.begin.data(), hn::DemoteTo(ints, index)));
+  const Reals begin = hn::PromoteTo(ContactTag(), begin_of(hn::DemoteTo(Ints(), index)));
   const auto fine = hn::Ge(begin, zero);
   const Reals cells = hn::IfThenElse(fine, real(kBlock), one);
   const Places in_block = times(minus(inside, block), cells);
@@ -131,39 +136,12 @@ HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point) {
   return {first, row, layer, minus(in_block, cell), hn::Mul(hn::Sqrt(squared(away)), real(edge))};
 }
 
-HWY_INLINE Reals between(Reals a, Reals b, Reals share) {
-  return hn::MulAdd(hn::Sub(b, a), share, a);
+HWY_INLINE auto read_begin(const DistanceGrid& grid) {
+  return [&grid](Blocks index)
+             HWY_ATTR { return hn::GatherIndex(Ints(), grid.begin.data(), index); };
 }
-
-// Along x, from two neighbours, read at once.
-struct AlongX {
-  Reals value, slope;
-};
-HWY_INLINE AlongX along_x(const float* values, Reals from, Reals share) {
-  const ContactTag tag;
-  const hn::Rebind<std::int32_t, ContactTag> ints;
-  const hn::Rebind<float, ContactTag> floats;
-  const hn::Rebind<std::uint32_t, ContactTag> words;
-  const hn::RebindToSigned<ContactTag> offsets;
-  const hn::RebindToUnsigned<ContactTag> pairs;
-  const auto bytes = hn::ShiftLeft<2>(hn::PromoteTo(offsets, hn::DemoteTo(ints, from)));
-  const auto pair = hn::GatherOffset(pairs, reinterpret_cast<const std::uint64_t*>(values), bytes);
-  const Reals a = hn::PromoteTo(tag, hn::BitCast(floats, hn::TruncateTo(words, pair)));
-  const Reals b =
-      hn::PromoteTo(tag, hn::BitCast(floats, hn::TruncateTo(words, hn::ShiftRight<32>(pair))));
-  const Reals slope = hn::Sub(b, a);
-  return {hn::MulAdd(slope, share, a), slope};
-}
-
-struct AcrossY {
-  Reals value, x, y;
-};
-HWY_INLINE AcrossY across_y(const float* values, Reals from, const InGrids& at) {
-  const AlongX low = along_x(values, from, at.share.x),
-               high = along_x(values, hn::Add(from, at.row), at.share.x);
-  const Reals slope = hn::Sub(high.value, low.value);
-  return {hn::MulAdd(slope, at.share.y, low.value), between(low.slope, high.slope, at.share.y),
-          slope};
+HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point) {
+  return locate(grid, point, read_begin(grid));
 }
 
 struct BetweenCorners {
@@ -171,13 +149,50 @@ struct BetweenCorners {
   Places slope;
 };
 
+// Values at two corners of cells that are neighbours along x.
+struct TwoCorners {
+  Floats low, high;
+};
+// In the order of the grid: corners 0 and 1, 2 and 3, 4 and 5, 6 and 7.
+using Corners = std::array<TwoCorners, 4>;
+
+HWY_INLINE TwoCorners read_two(const float* values, Reals from) {
+  const hn::Rebind<std::uint32_t, ContactTag> words;
+  const hn::RebindToSigned<ContactTag> offsets;
+  const hn::RebindToUnsigned<ContactTag> pairs;
+  const auto bytes = hn::ShiftLeft<2>(hn::PromoteTo(offsets, hn::DemoteTo(Ints(), from)));
+  const auto pair = hn::GatherOffset(pairs, reinterpret_cast<const std::uint64_t*>(values), bytes);
+  return {hn::BitCast(FloatTag(), hn::TruncateTo(words, pair)),
+          hn::BitCast(FloatTag(), hn::TruncateTo(words, hn::ShiftRight<32>(pair)))};
+}
+
+HWY_INLINE Corners read_corners(const float* values, const InGrids& at) {
+  const Reals above = hn::Add(at.first, at.layer);
+  return {read_two(values, at.first), read_two(values, hn::Add(at.first, at.row)),
+          read_two(values, above), read_two(values, hn::Add(above, at.row))};
+}
+
+HWY_INLINE BetweenCorners between(const Corners& corners, const Places& share) {
+  const auto mix = [](Reals a, Reals b, Reals s)
+                       HWY_ATTR { return hn::MulAdd(hn::Sub(b, a), s, a); };
+  Reals x[4], dx[4], y[2], dxy[2], dy[2];
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Reals low = hn::PromoteTo(ContactTag(), corners[k].low);
+    dx[k] = hn::Sub(hn::PromoteTo(ContactTag(), corners[k].high), low);
+    x[k] = hn::MulAdd(dx[k], share.x, low);
+  }
+  for (std::size_t k = 0; k < 2; ++k) {
+    dy[k] = hn::Sub(x[2 * k + 1], x[2 * k]);
+    y[k] = hn::MulAdd(dy[k], share.y, x[2 * k]);
+    dxy[k] = mix(dx[2 * k], dx[2 * k + 1], share.y);
+  }
+  return {mix(y[0], y[1], share.z),
+          {mix(dxy[0], dxy[1], share.z), mix(dy[0], dy[1], share.z), hn::Sub(y[1], y[0])}};
+}
+
 // Between the values at the corners of cells.
 HWY_INLINE BetweenCorners between_corners(const float* values, const InGrids& at) {
-  const AcrossY low = across_y(values, at.first, at),
-                high = across_y(values, hn::Add(at.first, at.layer), at);
-  return {between(low.value, high.value, at.share.z),
-          {between(low.x, high.x, at.share.z), between(low.y, high.y, at.share.z),
-           hn::Sub(high.value, low.value)}};
+  return between(read_corners(values, at), at.share);
 }
 
 HWY_INLINE Places direction(const Places& v) {
@@ -189,11 +204,46 @@ HWY_INLINE Places direction(const Places& v) {
           hn::IfThenElseZero(sloped, normal.z)};
 }
 
+HWY_INLINE Distances distances(const DistanceGrid& grid, const InGrids& at,
+                               const BetweenCorners& between) {
+  return {hn::IfThenElse(hn::Gt(at.beyond, real(0)), hn::Add(real(grid.reach), at.beyond),
+                         between.value),
+          direction(between.slope)};
+}
 HWY_INLINE Distances distances(const DistanceGrid& grid, const Places& point) {
   const InGrids at = locate(grid, point);
-  const auto [value, slope] = between_corners(grid.values.data(), at);
-  return {hn::IfThenElse(hn::Gt(at.beyond, real(0)), hn::Add(real(grid.reach), at.beyond), value),
-          direction(slope)};
+  return distances(grid, at, between_corners(grid.values.data(), at));
+}
+// lane: which of the particles that the cells are of is the first here.
+HWY_INLINE Distances distances(const DistanceGrid& grid, const Places& point, KnownCells& known,
+                               std::size_t lane) {
+  const auto same = [](Blocks a, Blocks b) HWY_ATTR { return hn::AllTrue(Ints(), hn::Eq(a, b)); };
+  std::int32_t *const block = &known.block[lane], *const begin = &known.begin[lane],
+                      *const cell = &known.cell[lane];
+  const InGrids at = locate(grid, point, [&](Blocks index) HWY_ATTR {
+    if (same(index, hn::LoadU(Ints(), block))) return hn::LoadU(Ints(), begin);
+    const Blocks read = read_begin(grid)(index);
+    hn::StoreU(index, Ints(), block);
+    hn::StoreU(read, Ints(), begin);
+    return read;
+  });
+
+  Corners corners;
+  auto& values = known.corner_values;
+  const Blocks now = hn::DemoteTo(Ints(), at.first);
+  if (same(now, hn::LoadU(Ints(), cell))) {
+    for (std::size_t k = 0; k < corners.size(); ++k)
+      corners[k] = {hn::LoadU(FloatTag(), &values[2 * k][lane]),
+                    hn::LoadU(FloatTag(), &values[2 * k + 1][lane])};
+  } else {
+    corners = read_corners(grid.values.data(), at);
+    hn::StoreU(now, Ints(), cell);
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      hn::StoreU(corners[k].low, FloatTag(), &values[2 * k][lane]);
+      hn::StoreU(corners[k].high, FloatTag(), &values[2 * k + 1][lane]);
+    }
+  }
+  return distances(grid, at, between(corners, at.share));
 }
 
 HWY_INLINE Distances distances(const PosedBody& body, const Places& point) {
@@ -235,14 +285,19 @@ struct Gaps {
   Reals least;
   Distances first;
 };
-HWY_INLINE Gaps gaps(const Contacts& contacts, const Places& x) {
+// known: of the first collider where that is a first_grid(), and lane as in distances(); or none.
+HWY_INLINE Gaps gaps(const Contacts& contacts, const Places& x, KnownCells* known,
+                     std::size_t lane) {
   const auto gap = [&](const Contacts::Placed& placed, Reals value) HWY_ATTR {
     Reals beyond = hn::Sub(value, real(contacts.skin()));
     if (contacts.jumps(placed)) beyond = hn::Min(beyond, hn::Max(value, real(0)));
     return placed.steepest == 1 ? beyond : hn::Div(beyond, real(placed.steepest));
   };
   const auto placed = contacts.placed();
-  const Distances first = distances(placed[0], x);
+  const DistanceGrid* grid = known != nullptr ? contacts.first_grid() : nullptr;
+  const Distances first =
+      grid != nullptr ? distances(*grid, minus(x, everywhere(placed[0].offset)), *known, lane)
+                      : distances(placed[0], x);
   Reals least = gap(placed[0], first.value);
   for (const Contacts::Placed& each : placed.subspan(1))
     least = hn::Min(least, gap(each, distances(each, x).value));

@@ -41,10 +41,11 @@ struct Stored {
 
 template <class T>
 double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                      SweepState<T>& state) {
+                      std::span<KnownCells> known, SweepState<T>& state) {
   using State = SweepState<T>;
   using Of = Stored<T>;
-  constexpr int kLanes = LatticeLayout<T>::kLanes;
+  constexpr int kLanes = LatticeLayout<T>::kLanes, kGroup = KnownCells::kParticles,
+                kGroups = kLanes / kGroup;
   const int step = static_cast<int>(hn::Lanes(ContactTag()));
   const Places from = everywhere(origin);
   const Reals far = real(std::numeric_limits<double>::infinity());
@@ -66,7 +67,10 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
 
       const auto free = hn::Gt(Of::load(at(State::kStep2)), real(0));
       Places x = plus(from, exact(State::kX, State::kXError));
-      const Gaps found = gaps(contacts, x);
+      const int group = (row * state.vectors() + j) * kGroups + part / kGroup;
+      const Gaps found =
+          gaps(contacts, x, known.empty() ? nullptr : &known[static_cast<std::size_t>(group)],
+               static_cast<std::size_t>(part % kGroup));
       const Reals gap = hn::IfThenElse(free, found.least, far);
       nearest = hn::Min(nearest, gap);
       const auto touching = hn::Lt(gap, real(0));
@@ -100,12 +104,12 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
 }
 
 double resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                      SweepState<float>& state) {
-  return resolve_row_as(contacts, origin, compensated, row, state);
+                      std::span<KnownCells> known, SweepState<float>& state) {
+  return resolve_row_as(contacts, origin, compensated, row, known, state);
 }
 double resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                      SweepState<double>& state) {
-  return resolve_row_as(contacts, origin, compensated, row, state);
+                      std::span<KnownCells> known, SweepState<double>& state) {
+  return resolve_row_as(contacts, origin, compensated, row, known, state);
 }
 
 }  // namespace weft::HWY_NAMESPACE
@@ -119,13 +123,13 @@ HWY_EXPORT(resolve_double);
 
 template <>
 double resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                   SweepState<float>& state) {
-  return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, row, state);
+                   std::span<KnownCells> known, SweepState<float>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, row, known, state);
 }
 template <>
 double resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                   SweepState<double>& state) {
-  return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, row, state);
+                   std::span<KnownCells> known, SweepState<double>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, row, known, state);
 }
 
 }  // namespace weft

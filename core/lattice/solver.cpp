@@ -106,10 +106,15 @@ class LatticeSolver : public SheetSolver {
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
     const bool in_parts = contacts.may_cross(moved_);
+    if (contacts.first_grid() != nullptr) {
+      constexpr std::size_t kGroups = LatticeLayout<T>::kLanes / KnownCells::kParticles;
+      known_.resize(static_cast<std::size_t>(law_.layout.rows * state_.vectors()) * kGroups);
+    }
     gaps_.look(moved_ + contacts.reach(), bands(pool), pool, [&](int row) {
       const std::vector<Vector3d> before = measures_ ? positions_in(row) : std::vector<Vector3d>();
-      const double gap = in_parts ? resolve_in_parts(contacts, row)
-                                  : resolve_row(contacts, origin_, law_.compensated, row, state_);
+      const double gap =
+          in_parts ? resolve_in_parts(contacts, row)
+                   : resolve_row(contacts, origin_, law_.compensated, row, known_, state_);
       if (measures_) pushes_[static_cast<std::size_t>(row)] = farthest_from(before, row);
       return gap;
     });
@@ -154,6 +159,7 @@ class LatticeSolver : public SheetSolver {
 
   void release_memory() override {
     state_.release_memory();
+    known_ = {};
     tethers_ = {};
   }
   void restore_memory() override {
@@ -313,6 +319,7 @@ class LatticeSolver : public SheetSolver {
   bool started_ = false;
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
   double moved_ = 0;                    // farthest displacement of the last step, m
+  std::vector<KnownCells> known_;       // of groups of lanes, where the first collider has a grid
   double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
   bool measures_ = false;               // pushed_
   std::vector<double> pushes_;          // the same of each row when last looked at, m

@@ -41,8 +41,9 @@ HWY_INLINE Places load_places(const T* from) {
 
 template <class T>
 double resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                      TriangleState<T>& state) {
+                      std::span<KnownCells> known, TriangleState<T>& state) {
   const ContactTag d;
+  KnownCells* const cells = known.empty() ? nullptr : &known[static_cast<std::size_t>(run)];
   const Reals far = real(std::numeric_limits<double>::infinity());
   constexpr std::size_t kValues = 4;
   static_assert(kContactRun % Lanes::kMost == 0);
@@ -56,7 +57,7 @@ double resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool com
     };
     const auto free = hn::Gt(load_places(state.step2.data() + first).x, real(0));
     Places x = plus(everywhere(origin), exact(state.x, state.x_error));
-    const Gaps found = gaps(contacts, x);
+    const Gaps found = gaps(contacts, x, cells, (first - begin) / kValues);
     const Reals gap = hn::IfThenElse(free, found.least, far);
     nearest = hn::Min(nearest, gap);
     const auto touching = hn::Lt(gap, real(0));
@@ -90,12 +91,12 @@ double resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool com
 }
 
 double resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                      TriangleState<float>& state) {
-  return resolve_run_as(contacts, origin, compensated, run, state);
+                      std::span<KnownCells> known, TriangleState<float>& state) {
+  return resolve_run_as(contacts, origin, compensated, run, known, state);
 }
 double resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                      TriangleState<double>& state) {
-  return resolve_run_as(contacts, origin, compensated, run, state);
+                      std::span<KnownCells> known, TriangleState<double>& state) {
+  return resolve_run_as(contacts, origin, compensated, run, known, state);
 }
 
 }  // namespace weft::HWY_NAMESPACE
@@ -109,13 +110,13 @@ HWY_EXPORT(resolve_double);
 
 template <>
 double resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                   TriangleState<float>& state) {
-  return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, run, state);
+                   std::span<KnownCells> known, TriangleState<float>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, run, known, state);
 }
 template <>
 double resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                   TriangleState<double>& state) {
-  return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, run, state);
+                   std::span<KnownCells> known, TriangleState<double>& state) {
+  return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, run, known, state);
 }
 
 }  // namespace weft

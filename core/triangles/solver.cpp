@@ -93,10 +93,12 @@ class TriangleSolver : public SheetSolver {
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
     const bool may_cross = contacts.may_cross(moved_);
+    if (contacts.first_grid() != nullptr) known_.resize(gaps_.parts());
     gaps_.look(moved_ + contacts.reach(), bands(pool), pool, [&](int run) {
       const Positions before = measures_ ? positions_in(run) : Positions();
-      const double gap = may_cross ? resolve_in_parts(contacts, run)
-                                   : resolve_run(contacts, origin_, law_.compensated, run, state_);
+      const double gap =
+          may_cross ? resolve_in_parts(contacts, run)
+                    : resolve_run(contacts, origin_, law_.compensated, run, known_, state_);
       if (measures_)
         pushes_[static_cast<std::size_t>(run)] =
             gap < 0 || may_cross ? farthest_from(before, run) : 0;
@@ -138,6 +140,7 @@ class TriangleSolver : public SheetSolver {
 
   void release_memory() override {
     state_.release_memory();
+    known_ = {};
     law_.release();
   }
   void restore_memory() override {
@@ -327,6 +330,7 @@ class TriangleSolver : public SheetSolver {
   std::vector<Hinge> hinges_;           // by numbers in hinged_
   std::vector<int> hinged_;             // particles
   Matrix3Xd hinged_x_, hinged_force_;   // of these, m and N
+  std::vector<KnownCells> known_;       // of runs, where the first collider has a grid
   double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
   bool measures_ = false;               // pushed_
   std::vector<double> pushes_;          // the same of each run when last looked at, m

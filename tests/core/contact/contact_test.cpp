@@ -194,7 +194,7 @@ void expect_rows_like_particles(const std::vector<Collider>& colliders) {
   Rows<T> rows, before;
   int touched = 0, i = 0;
   for (int row = 0; row < rows.kRows; ++row) {
-    const double gap = resolve_row(contacts, rows.origin, rows.kCompensated, row, rows.state);
+    const double gap = resolve_row(contacts, rows.origin, rows.kCompensated, row, {}, rows.state);
     double nearest = std::numeric_limits<double>::infinity();
     for (int c = 0; c < rows.kColumns; ++c, ++i) {
       Vector3d x = before.x(i), d = before.d(i);

@@ -187,8 +187,8 @@ class Garments {
     client::GarmentScene made = make(*connection_, order);
     set_in_motion(*made.scene.mutable_colliders(0)->mutable_mesh()->mutable_data());
     Simulation simulation = simulate(made.scene);
+    Scheduler scheduler(2);  // threads that have nothing to do by the time they are asked to help
     follow_until(simulation, kStands, false);
-    Scheduler scheduler(2);
     IdleThreads pool(scheduler, std::min(2, simulation.most_threads()));
     const Passage passage = follow_until(simulation, kStands + kMoves, false, pool);
     const Verdict verdict = simulation.verdict();

@@ -22,8 +22,8 @@ namespace weft::HWY_NAMESPACE {
 using ContactTag = hn::ScalableTag<double>;
 using Reals = hn::Vec<ContactTag>;
 using Places = Triple<Reals>;
-using Ints = hn::Rebind<std::int32_t, ContactTag>;
-using Blocks = hn::Vec<Ints>;
+using IntTag = hn::Rebind<std::int32_t, ContactTag>;
+using Ints = hn::Vec<IntTag>;
 using FloatTag = hn::Rebind<float, ContactTag>;
 using Floats = hn::Vec<FloatTag>;
 
@@ -123,7 +123,7 @@ HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point, const F
                          HWY_ATTR { return hn::Min(hn::Floor(v), hn::Sub(end, one)); };
   const Places block{whole(inside.x, most.x), whole(inside.y, most.y), whole(inside.z, most.z)};
   const Reals index = hn::MulAdd(hn::MulAdd(block.z, most.y, block.y), most.x, block.x);
-  const Reals begin = hn::PromoteTo(ContactTag(), begin_of(hn::DemoteTo(Ints(), index)));
+  const Reals begin = hn::PromoteTo(ContactTag(), begin_of(hn::DemoteTo(IntTag(), index)));
   const auto fine = hn::Ge(begin, zero);
   const Reals cells = hn::IfThenElse(fine, real(kBlock), one);
   const Places in_block = times(minus(inside, block), cells);
@@ -137,8 +137,8 @@ HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point, const F
 }
 
 HWY_INLINE auto read_begin(const DistanceGrid& grid) {
-  return [&grid](Blocks index)
-             HWY_ATTR { return hn::GatherIndex(Ints(), grid.begin.data(), index); };
+  return [&grid](Ints index)
+             HWY_ATTR { return hn::GatherIndex(IntTag(), grid.begin.data(), index); };
 }
 HWY_INLINE InGrids locate(const DistanceGrid& grid, const Places& point) {
   return locate(grid, point, read_begin(grid));
@@ -160,7 +160,7 @@ HWY_INLINE TwoCorners read_two(const float* values, Reals from) {
   const hn::Rebind<std::uint32_t, ContactTag> words;
   const hn::RebindToSigned<ContactTag> offsets;
   const hn::RebindToUnsigned<ContactTag> pairs;
-  const auto bytes = hn::ShiftLeft<2>(hn::PromoteTo(offsets, hn::DemoteTo(Ints(), from)));
+  const auto bytes = hn::ShiftLeft<2>(hn::PromoteTo(offsets, hn::DemoteTo(IntTag(), from)));
   const auto pair = hn::GatherOffset(pairs, reinterpret_cast<const std::uint64_t*>(values), bytes);
   return {hn::BitCast(FloatTag(), hn::TruncateTo(words, pair)),
           hn::BitCast(FloatTag(), hn::TruncateTo(words, hn::ShiftRight<32>(pair)))};
@@ -217,27 +217,27 @@ HWY_INLINE Distances distances(const DistanceGrid& grid, const Places& point) {
 // lane: which of the particles that the cells are of is the first here.
 HWY_INLINE Distances distances(const DistanceGrid& grid, const Places& point, KnownCells& known,
                                std::size_t lane) {
-  const auto same = [](Blocks a, Blocks b) HWY_ATTR { return hn::AllTrue(Ints(), hn::Eq(a, b)); };
+  const auto same = [](Ints a, Ints b) HWY_ATTR { return hn::AllTrue(IntTag(), hn::Eq(a, b)); };
   std::int32_t *const block = &known.block[lane], *const begin = &known.begin[lane],
                       *const cell = &known.cell[lane];
-  const InGrids at = locate(grid, point, [&](Blocks index) HWY_ATTR {
-    if (same(index, hn::LoadU(Ints(), block))) return hn::LoadU(Ints(), begin);
-    const Blocks read = read_begin(grid)(index);
-    hn::StoreU(index, Ints(), block);
-    hn::StoreU(read, Ints(), begin);
+  const InGrids at = locate(grid, point, [&](Ints index) HWY_ATTR {
+    if (same(index, hn::LoadU(IntTag(), block))) return hn::LoadU(IntTag(), begin);
+    const Ints read = read_begin(grid)(index);
+    hn::StoreU(index, IntTag(), block);
+    hn::StoreU(read, IntTag(), begin);
     return read;
   });
 
   Corners corners;
   auto& values = known.corner_values;
-  const Blocks now = hn::DemoteTo(Ints(), at.first);
-  if (same(now, hn::LoadU(Ints(), cell))) {
+  const Ints now = hn::DemoteTo(IntTag(), at.first);
+  if (same(now, hn::LoadU(IntTag(), cell))) {
     for (std::size_t k = 0; k < corners.size(); ++k)
       corners[k] = {hn::LoadU(FloatTag(), &values[2 * k][lane]),
                     hn::LoadU(FloatTag(), &values[2 * k + 1][lane])};
   } else {
     corners = read_corners(grid.values.data(), at);
-    hn::StoreU(now, Ints(), cell);
+    hn::StoreU(now, IntTag(), cell);
     for (std::size_t k = 0; k < corners.size(); ++k) {
       hn::StoreU(corners[k].low, FloatTag(), &values[2 * k][lane]);
       hn::StoreU(corners[k].high, FloatTag(), &values[2 * k + 1][lane]);

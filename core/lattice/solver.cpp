@@ -105,7 +105,7 @@ class LatticeSolver : public SheetSolver {
 
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
-    const bool in_parts = contacts.may_cross(moved_);
+    const bool may_cross = contacts.may_cross(moved_);
     if (contacts.first_grid() != nullptr) {
       constexpr std::size_t kGroups = LatticeLayout<T>::kLanes / KnownCells::kParticles;
       known_.resize(static_cast<std::size_t>(law_.layout.rows * state_.vectors()) * kGroups);
@@ -113,8 +113,8 @@ class LatticeSolver : public SheetSolver {
     gaps_.look(moved_ + contacts.reach(), bands(pool), pool, [&](int row) {
       const std::vector<Vector3d> before = measures_ ? positions_in(row) : std::vector<Vector3d>();
       const double gap =
-          in_parts ? resolve_in_parts(contacts, row)
-                   : resolve_row(contacts, origin_, law_.compensated, row, known_, state_);
+          may_cross ? resolve_in_parts(contacts, row)
+                    : resolve_row(contacts, origin_, law_.compensated, row, known_, state_);
       if (measures_) pushes_[static_cast<std::size_t>(row)] = farthest_from(before, row);
       return gap;
     });

@@ -13,8 +13,8 @@ namespace weft {
 // collider, may have come as far as its gap was wide.
 class Gaps {
  public:
-  // So many parts in a row are saved as one.
-  explicit Gaps(std::size_t parts, std::ptrdiff_t together) : gap_(parts), together_(together) {}
+  // So many parts in a row are saved as one, lest snapshots grow with them.
+  Gaps(std::size_t parts, std::ptrdiff_t together) : gap_(parts), together_(together) {}
 
   // Every part is to be looked at.
   void forget() {

@@ -192,9 +192,13 @@ void expect_rows_like_particles(const std::vector<Collider>& colliders) {
   bodies.place(colliders, 0.7, 0.1);
   const Contacts contacts(colliders, bodies, 0.4, 1e-3, 0.7, 0.1);
   Rows<T> rows, before;
+  constexpr std::size_t kGroups = LatticeLayout<T>::kLanes / KnownCells::kParticles;
+  std::vector<KnownCells> known(static_cast<std::size_t>(rows.kRows * rows.state.vectors()) *
+                                kGroups);
   int touched = 0, i = 0;
   for (int row = 0; row < rows.kRows; ++row) {
-    const double gap = resolve_row(contacts, rows.origin, rows.kCompensated, row, {}, rows.state);
+    const double gap =
+        resolve_row(contacts, rows.origin, rows.kCompensated, row, known, rows.state);
     double nearest = std::numeric_limits<double>::infinity();
     for (int c = 0; c < rows.kColumns; ++c, ++i) {
       Vector3d x = before.x(i), d = before.d(i);

@@ -228,7 +228,8 @@ void add_drape(CLI::App& app, Context& context) {
       ->add_option(
           "--textile", options->textile,
           "Preset (weft textile list), or a file (weft textile new); else denim_11oz for a "
-          "skirt or trousers, wool_tropical for a dress, jersey_interlock for all else")
+          "skirt or trousers, wool_tropical for a dress or a pleated_skirt, jersey_interlock for "
+          "all else")
       ->option_text("NAME|FILE.json");
   command
       ->add_option("--edge", options->drape.edge_m,

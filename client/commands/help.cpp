@@ -102,8 +102,10 @@ do; same_direction turns one of them over. Of sides of two lengths the longer
 one is gathered evenly. A dart is a notch whose sides are sewn. With fold_rad a
 seam is pressed to an angle: 3 folds the panels outside on outside, -3 inside on
 inside. So is a panel along lines inside it, its creases: {"points_m": [0.1, 0,
-0.1, 0.3], "fold_rad": 3}. A closed band, such as a collar, does not turn over
-by itself: make it of two panels, and place them folded.
+0.1, 0.3], "fold_rad": 3}, and with start_rad it is folded there when it is put
+on, as pleats are (weft garment new pleated_skirt). A closed band, such as a
+collar, does not turn over by itself: make it of two panels, and place them
+folded.
 
   weft drape tshirt --size 40 -o tshirt.glb           put on, until it hangs
   weft garment new tshirt --size 40 -o tshirt.json    by the tape, or by size

@@ -112,16 +112,30 @@ void Draft::add(const std::string& name, const Outline& outline, const PanelPlac
   rotation->set_z(rounded(place.rotation.z()));
 }
 
-void Draft::add_runs(const Side& side,
-                     google::protobuf::RepeatedPtrField<v1::EdgeRun>& runs) const {
+v1::PatternPanel& Draft::panel(const std::string& name) {
+  auto& panels = *pattern_.mutable_panels();
+  const auto panel = std::ranges::find(panels, name, &v1::PatternPanel::name);
+  if (panel == panels.end()) throw std::logic_error("no panel " + name);
+  return *panel;
+}
+
+void Draft::crease(const std::string& panel, std::initializer_list<Vector2d> points,
+                   double fold_rad, double start_rad) {
+  v1::PatternCrease* crease = this->panel(panel).add_creases();
+  for (const Vector2d& point : points)
+    for (const double value : point) crease->add_points_m(rounded(value));
+  crease->set_fold_rad(fold_rad);
+  crease->set_start_rad(start_rad);
+}
+
+void Draft::add_runs(const Side& side, google::protobuf::RepeatedPtrField<v1::EdgeRun>& runs) {
+  const auto& edges = panel(side.panel).edges();
   for (const std::string& label : side.labels) {
-    const auto panel = std::ranges::find(pattern_.panels(), side.panel, &v1::PatternPanel::name);
-    if (panel == pattern_.panels().end()) throw std::logic_error("no panel " + side.panel);
-    const auto edge = std::ranges::find(panel->edges(), label, &v1::PatternEdge::label);
-    if (edge == panel->edges().end()) throw std::logic_error("no edge " + label);
+    const auto edge = std::ranges::find(edges, label, &v1::PatternEdge::label);
+    if (edge == edges.end()) throw std::logic_error("no edge " + label);
     v1::EdgeRun* run = runs.Add();
     run->set_panel(side.panel);
-    run->set_edge(static_cast<int>(edge - panel->edges().begin()));
+    run->set_edge(static_cast<int>(edge - edges.begin()));
   }
 }
 

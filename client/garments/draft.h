@@ -56,6 +56,9 @@ class Draft {
  public:
   void add(const std::string& name, const Outline& outline, const PanelPlace& place,
            double grain_rad = 0);
+  // Along a line of a panel, pressed to an angle, at which it may start.
+  void crease(const std::string& panel, std::initializer_list<Vector2d> points, double fold_rad,
+              double start_rad);
 
   struct Side {
     std::string panel;
@@ -67,7 +70,8 @@ class Draft {
   v1::Pattern take() { return std::move(pattern_); }
 
  private:
-  void add_runs(const Side& side, google::protobuf::RepeatedPtrField<v1::EdgeRun>& runs) const;
+  v1::PatternPanel& panel(const std::string& name);
+  void add_runs(const Side& side, google::protobuf::RepeatedPtrField<v1::EdgeRun>& runs);
 
   v1::Pattern pattern_;
 };

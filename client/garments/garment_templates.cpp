@@ -7,59 +7,11 @@
 #include <numbers>
 
 #include "client/garments/draft.h"
+#include "client/garments/skirts.h"
+#include "client/garments/surroundings.h"
 
 namespace weft::client {
 namespace {
-
-constexpr double kClear = 0.02;  // between the body and a panel beside it, m
-constexpr const char* kSides[] = {"left", "right"};
-
-// Where the body is, as far as panels have to know.
-class Surroundings {
- public:
-  explicit Surroundings(const DressForm& form) : form_(form) {}
-
-  // Foremost, or with -1 hindmost point of what lies within `wide` of the middle between two
-  // heights, m.
-  double depth(double direction, double low, double high, double wide) const {
-    double most = 0;
-    for (const Vector3d& at : form_.mesh.vertices)
-      if (at.y() >= low && at.y() <= high && std::abs(at.x()) <= wide)
-        most = std::max(most, direction * at.z());
-    return direction * most;
-  }
-  // Highest point of the body near x, below the chin, m.
-  double top(double x) const {
-    constexpr double kNear = 0.015;
-    double most = 0;
-    for (const Vector3d& at : form_.mesh.vertices)
-      if (std::abs(at.x() - x) < kNear && at.y() < form_.neck_height + 0.04)
-        most = std::max(most, at.y());
-    return most;
-  }
-  // Where the legs part, m.
-  double crotch() const {
-    constexpr double kNear = 0.01;
-    const double hip = form_.girth("hip").height;
-    double least = hip;
-    for (const Vector3d& at : form_.mesh.vertices)
-      if (std::abs(at.x()) < kNear && at.y() > hip / 2) least = std::min(least, at.y());
-    return least;
-  }
-
- private:
-  const DressForm& form_;
-};
-
-PanelPlace front_of(const Outline& outline, const Surroundings& body) {
-  return {{0, 0, body.depth(1, outline.least_v(), outline.most_v(), outline.most_u()) + kClear}};
-}
-PanelPlace back_of(const Outline& outline, const Surroundings& body) {
-  const double z = body.depth(-1, outline.least_v(), outline.most_v(), outline.most_u()) - kClear;
-  return behind({}, z);
-}
-
-std::string of_side(const char* label, const std::string& side) { return label + ("-" + side); }
 
 // A top's body, half of it drawn, down to a hem: heights, and half widths.
 struct Bodice {
@@ -210,86 +162,6 @@ v1::Pattern tshirt(const DressForm& form) {
   add_bodice(draft, b, body);
   const double half = upper_arm_half(form, 0.09);
   add_sleeves(draft, form, b, {half, 0.92 * half, 0.07});
-  return draft.take();
-}
-
-// A piece of a skirt from the waist, with two darts of that width and depth.
-struct SkirtPiece {
-  double waist, waist_half, hip, hip_half, hem, hem_half;
-  double dart_width, dart_depth;
-};
-
-Outline skirt_outline(const SkirtPiece& s, bool front) {
-  const std::string here = front ? "left" : "right", there = front ? "right" : "left";
-  const auto side = of_side("side", here), other = of_side("side", there);
-  const double half = s.waist_half + s.dart_width, dart = s.waist_half / 2 + s.dart_width / 2;
-  const double fall = s.waist - s.hip;
-  const Vector2d hip_high(s.hip_half, s.hip + 0.45 * fall),
-      waist_low(half + 0.006, s.waist - 0.3 * fall);
-  Outline outline({-s.hem_half, s.hem});
-  outline.line("hem", {s.hem_half, s.hem});
-  outline.line(("low-" + side).c_str(), {s.hip_half, s.hip});
-  outline.curve(side.c_str(), {hip_high, waist_low, Vector2d(half, s.waist)});
-  outline.line("waist-1", {dart + s.dart_width / 2, s.waist});
-  outline.line("dart-1", {dart, s.waist - s.dart_depth});
-  outline.line("dart-2", {dart - s.dart_width / 2, s.waist});
-  outline.line("waist-2", {-dart + s.dart_width / 2, s.waist});
-  outline.line("dart-3", {-dart, s.waist - s.dart_depth});
-  outline.line("dart-4", {-dart - s.dart_width / 2, s.waist});
-  outline.line("waist-3", {-half, s.waist});
-  outline.curve(other.c_str(),
-                {Vector2d(-waist_low.x(), waist_low.y()), Vector2d(-hip_high.x(), hip_high.y()),
-                 Vector2d(-s.hip_half, s.hip)});
-  outline.line(("low-" + other).c_str(), {-s.hem_half, s.hem});
-  return outline;
-}
-
-// A trapezoid on the body's middle.
-Outline trapezoid(const char* lower, double low, double low_half, const char* upper, double high,
-                  double high_half, bool front) {
-  const std::string here = front ? "left" : "right", there = front ? "right" : "left";
-  Outline outline({-low_half, low});
-  outline.line(lower, {low_half, low});
-  outline.line(of_side("side", here).c_str(), {high_half, high});
-  outline.line(upper, {-high_half, high});
-  outline.line(of_side("side", there).c_str(), {-low_half, low});
-  return outline;
-}
-
-Outline band_outline(double half, double low, double height, bool front) {
-  return trapezoid("lower", low, half, "upper", low + height, half, front);
-}
-
-v1::Pattern skirt(const DressForm& form) {
-  constexpr double kBand = 0.035;
-  const Surroundings body(form);
-  Draft draft;
-  SkirtPiece piece{};
-  piece.waist = form.girth("waist").height - kBand / 2;
-  piece.waist_half = (form.girth("waist").wanted + 0.015) / 4;
-  piece.hip = form.girth("hip").height;
-  piece.hip_half = (form.girth("hip").wanted + 0.04) / 4;
-  piece.hem = 0.28 * form.stature;
-  piece.hem_half = piece.hip_half + 0.07;
-  for (const bool front : {true, false}) {
-    const std::string name = front ? "front" : "back";
-    piece.dart_width = front ? 0.012 : 0.022;
-    piece.dart_depth = front ? 0.09 : 0.13;
-    const Outline outline = skirt_outline(piece, front);
-    const Outline band = band_outline(piece.waist_half, piece.waist + 0.01, kBand, front);
-    const auto place = front ? front_of : back_of;
-    draft.add(name, outline, place(outline, body));
-    draft.add("band-" + name, band, place(band, body), std::numbers::pi / 2);
-    draft.sew({name, {"dart-1"}}, {name, {"dart-2"}});
-    draft.sew({name, {"dart-3"}}, {name, {"dart-4"}});
-    draft.sew({name, {"waist-1", "waist-2", "waist-3"}}, {"band-" + name, {"lower"}});
-  }
-  for (const std::string side : kSides) {
-    const std::string label = of_side("side", side);
-    draft.sew({"front", {label}}, {"back", {label}});
-    draft.sew({"front", {"low-" + label}}, {"back", {"low-" + label}});
-    draft.sew({"band-front", {label}}, {"band-back", {label}});
-  }
   return draft.take();
 }
 
@@ -474,7 +346,9 @@ const std::vector<Template>& all_templates() {
   static const std::vector<Template> all = {
       {{"tshirt", "A T-shirt: front, back, sleeves of two halves", kUsualTextile}, tshirt},
       {{"skirt", "A skirt to the knee: front and back with darts, a waistband", "denim_11oz"},
-       skirt},
+       make_skirt},
+      {{"pleated_skirt", "A skirt to the knee in box pleats, a waistband", "wool_tropical"},
+       make_pleated_skirt},
       {{"trousers", "Trousers to the ankle: legs of a front and a back, a waistband", "denim_11oz",
         0.02},
        trousers},

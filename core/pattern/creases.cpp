@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/model/text.h"
+#include "core/pattern/folded_panel.h"
 #include "core/pattern/symmetry.h"
 
 namespace weft {
@@ -112,10 +113,10 @@ std::vector<Problem> crease_problems(const PatternPanel& panel, const Border& bo
     problems.push_back({join(path, ".creases[", crease, "].points_m"),
                         join("crease ", crease, " of panel ", panel.name, " ", message)});
   };
+  const auto on_border = [&](int i) { return as_index(i) < lines.border.size(); };
   // inner points as they were given, and the ends where they were not taken to the outline
   for (std::size_t c = 0; c < lines.creases.size(); ++c) {
     const auto& points = panel.creases[c].points;
-    const auto on_border = [&](int i) { return as_index(i) < lines.border.size(); };
     for (std::size_t i = 0; i < points.size(); ++i) {
       const bool taken = (i == 0 && on_border(lines.creases[c].front())) ||
                          (i + 1 == points.size() && on_border(lines.creases[c].back()));
@@ -153,6 +154,18 @@ std::vector<Problem> crease_problems(const PatternPanel& panel, const Border& bo
       problem(static_cast<int>(c), join("leaves it near ", place(middle)));
   }
   if (!problems.empty()) return problems;
+  for (std::size_t c = 0; c < lines.creases.size(); ++c) {
+    const auto& [points, angle, start_angle] = panel.creases[c];
+    const auto& crease = lines.creases[c];
+    const bool parts_it = on_border(crease.front()) && on_border(crease.back());
+    if (start_angle == 0 || (parts_it && leads_on(points))) continue;
+    problems.push_back(
+        {join(path, ".creases[", c, "].start_rad"),
+         join("is ", start_angle, " rad, but crease ", c, " of panel ", panel.name,
+              parts_it
+                  ? " turns back: a panel starts folded along lines that lead on"
+                  : " ends inside it: a panel starts folded along lines from outline to outline")});
+  }
   if (const auto tight = find_tight(lines, kCreaseRoom * edge)) {
     const auto [point, line] = *tight;
     const bool at_border = as_index(point) < lines.border.size();

@@ -11,6 +11,7 @@
 #include "core/model/text.h"
 #include "core/pattern/borders.h"
 #include "core/pattern/creases.h"
+#include "core/pattern/folded_panel.h"
 #include "core/pattern/overlaps.h"
 #include "core/pattern/panel_mesher.h"
 #include "core/pattern/sets.h"
@@ -217,14 +218,14 @@ class Builder {
     for (std::size_t p = 0; p < meshes_.size(); ++p) {
       const PatternPanel& panel = pattern_.panels[p];
       const PanelMesh& from = meshes_[p];
+      const std::vector<Vector3d> placed = points_as_placed(p);
       const Eigen::Matrix3d rotation = panel.rotation.normalized().toRotationMatrix();
       const double mirrored = borders_.turned[p] ? -1 : 1;
       const int first = static_cast<int>(mesh.flat.size());
       for (std::size_t i = 0; i < from.points.size(); ++i) {
         const Vector2d& point = from.points[i];
         const int particle = particle_[p][i];
-        mesh.start[as_index(particle)] +=
-            origins_[p] + rotation * Vector3d(point.x(), point.y(), 0);
+        mesh.start[as_index(particle)] += origins_[p] + rotation * placed[i];
         ++shares[as_index(particle)];
         mesh.flat.emplace_back(mirrored * point.x(), point.y());
       }
@@ -247,6 +248,18 @@ class Builder {
       add_fold(particles_of(as_index(panel), points), angle);
     for (std::size_t p = 0; p < meshes_.size(); ++p) add_creases(p);
     if (mesh.flat_triangles == mesh.triangles) mesh.flat_triangles.clear();
+  }
+
+  // From its origin, in its own axes, m.
+  std::vector<Vector3d> points_as_placed(std::size_t p) const {
+    const PatternPanel& panel = pattern_.panels[p];
+    const Border& border = borders_.panels[p];
+    if (starts_folded(panel))
+      return folded_points(panel, border.lines.creases, meshes_[p], border.edges[0].front(),
+                           borders_.turned[p]);
+    std::vector<Vector3d> points;
+    for (const Vector2d& point : meshes_[p].points) points.emplace_back(point.x(), point.y(), 0);
+    return points;
   }
 
   // One with that before it where it goes on from there.

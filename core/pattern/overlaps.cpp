@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/pattern/folded_panel.h"
 #include "core/pattern/sets.h"
 
 namespace weft {
@@ -94,8 +95,9 @@ std::vector<Overlap> draw_apart(const Pattern& pattern, const std::vector<PanelM
   for (const PatternPanel& panel : pattern.panels)
     turns.push_back(panel.rotation.normalized().toRotationMatrix());
 
-  // in the plane of panel `in`, from its origin; none where the panel lies in another plane
+  // in the plane of panel `in`, from its origin; none where the panel lies in no plane, or another
   const auto placed = [&](std::size_t p, std::size_t in) -> std::optional<Placed> {
+    if (starts_folded(pattern.panels[p])) return std::nullopt;
     const Eigen::Matrix3d turn = turns[in].transpose() * turns[p];
     const Vector3d origin = turns[in].transpose() * (origins[p] - origins[in]);
     if (turn.col(2).head<2>().norm() > kParallel) return std::nullopt;
@@ -118,11 +120,11 @@ std::vector<Overlap> draw_apart(const Pattern& pattern, const std::vector<PanelM
       for (std::size_t q = p + 1; q < meshes.size(); ++q) {
         const auto second = placed(q, p);
         if (!second) continue;
-        const Placed first = *placed(p, p);
-        if (!covers(first, *second) && !covers(*second, first)) continue;
-        const Vector2d between = second->middle - first.middle;
+        const auto first = placed(p, p);
+        if (!first || (!covers(*first, *second) && !covers(*second, *first))) continue;
+        const Vector2d between = second->middle - first->middle;
         if (between.norm() < kGap) continue;
-        const double way = way_apart(first, *second, between.normalized()) + kGap;
+        const double way = way_apart(*first, *second, between.normalized()) + kGap;
         const Vector3d half = way / 2 * (turns[p].leftCols<2>() * between.normalized());
         moves[p] -= half;
         moves[q] += half;

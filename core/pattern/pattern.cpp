@@ -114,9 +114,10 @@ class PatternCheck {
                      kMostCreases);
     double whole = 0;
     for (std::size_t c = 0; c < panel.creases.size(); ++c) {
-      const auto& [points, angle] = panel.creases[c];
+      const auto& [points, angle, start_angle] = panel.creases[c];
       const std::string place = join(at, ".creases[", c, "]");
       number(place + ".fold_rad", angle, -kMostFold, kMostFold, " rad");
+      number(place + ".start_rad", start_angle, -kMostFold, kMostFold, " rad");
       if (points.size() < 2 || points.size() > kMostCreasePoints) {
         problem(place + ".points_m", "has ", points.size(), " points, not 2 to ",
                 kMostCreasePoints);

@@ -20,6 +20,7 @@ struct PatternEdge {
 struct PatternCrease {
   std::vector<Vector2d> points;  // u and v, m; an end beside the outline lies on it
   double angle = 0;              // that it is pressed to, as Fold has it, rad; 0: no fold
+  double start_angle = 0;        // that the panel is folded by where it is placed, rad
 };
 
 // A piece of a garment, u to the right and v up; unplaced it lies at x = u, y = v.

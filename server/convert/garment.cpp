@@ -36,7 +36,7 @@ class PatternReader {
       panel.edges.push_back(edge(from.edges(e), join(at, ".edges[", e, "]")));
     for (int c = 0; c < from.creases_size(); ++c)
       panel.creases.push_back({points(from.creases(c).points_m(), join(at, ".creases[", c, "]")),
-                               from.creases(c).fold_rad()});
+                               from.creases(c).fold_rad(), from.creases(c).start_rad()});
     const v1::Vector3& origin = from.placement().origin_m();
     panel.origin = {origin.x(), origin.y(), origin.z()};
     if (from.placement().has_rotation()) {

@@ -331,7 +331,7 @@ class Plain(unittest.TestCase):
         outline = [weft.PatternEdge([corner]) for corner in ((0.3, 0), (0.3, 0.2), (0, 0.2), (0, 0))]
         tube = weft.Pattern(
             [weft.PatternPanel("tube", outline,
-                               creases=[weft.PatternCrease([(0.1, 0), (0.1, 0.2)], 2)])],
+                               creases=[weft.PatternCrease([(0.1, 0), (0.1, 0.2)], 2, 1)])],
             [weft.PatternSeam([weft.EdgeRun("tube", 1)], [weft.EdgeRun("tube", 3)])])
         self.assertEqual(weft.Pattern.from_json(tube.to_json()), tube)
         built = self.server.build_garment(tube, 0.02)

@@ -535,13 +535,15 @@ class PatternEdge(Value):
 class PatternCrease(Value):
     """A line inside a panel that it is creased along.
 
-    points_m  (n, 2) from point to point; an end beside the outline lies on it
-    fold_rad  as Fold.angle_rad; 0 is no fold
+    points_m   (n, 2) from point to point; an end beside the outline lies on it
+    fold_rad   as Fold.angle_rad; 0 is no fold
+    start_rad  that the panel is folded by where it is placed
     """
 
     message = garment_pb2.PatternCrease
     points_m: npt.ArrayLike
     fold_rad: float = 0
+    start_rad: float = 0
 
     @classmethod
     def from_proto(cls, message: Any) -> "PatternCrease":

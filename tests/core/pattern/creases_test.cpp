@@ -229,6 +229,63 @@ TEST(Creases, AFreePanelComesToRestAtTheirAngle) {
   }
 }
 
+// Its particle at that place of the flat shape.
+Vector3d start_at(const Garment& garment, const Vector2d& flat) {
+  for (std::size_t i = 0; i < garment.mesh.flat.size(); ++i)
+    if ((garment.mesh.flat[i] - flat).norm() < 1e-9) return garment.mesh.start[i];
+  ADD_FAILURE() << "no particle at " << flat.transpose();
+  return Vector3d::Zero();
+}
+
+TEST(Creases, APanelStartsFoldedByTheirAnglesAndTheRestOfItStaysWhereItIsPlaced) {
+  // a box pleat 30 mm deep in a panel that stands in the plane x = 1
+  PatternPanel pleated = rectangle("front", 0.24, 0.3);
+  for (const auto& [u, angle] :
+       {std::pair(0.06, -pi / 2), {0.09, pi / 2}, {0.15, pi / 2}, {0.18, -pi / 2}})
+    pleated.creases.push_back({{{u, 0}, {u, 0.3}}, 3, angle});
+  pleated.origin = {1, 0, 0};
+  pleated.rotation = Quaterniond(Eigen::AngleAxisd(pi / 2, Vector3d::UnitY()));
+  const Garment garment = built({{pleated}, {}}, 0.03);
+  // of particles at a height of 0.3 m: along the panel, and out of it
+  for (const auto& [u, along, out] : {std::tuple(0.0, 0.0, 0.0),
+                                      {0.06, 0.06, 0.0},
+                                      {0.09, 0.06, -0.03},
+                                      {0.15, 0.12, -0.03},
+                                      {0.18, 0.12, 0.0},
+                                      {0.24, 0.18, 0.0}}) {
+    const Vector3d expected(1 + out, 0.3, -along);
+    EXPECT_LT((start_at(garment, {u, 0.3}) - expected).norm(), 1e-9) << u;
+  }
+  // nothing is strained by that
+  for (const auto& triangle : garment.mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto a = static_cast<std::size_t>(triangle[k]),
+                 b = static_cast<std::size_t>(triangle[(k + 1) % 3]);
+      EXPECT_NEAR((garment.mesh.start[a] - garment.mesh.start[b]).norm(),
+                  (garment.mesh.flat[a] - garment.mesh.flat[b]).norm(), 1e-9);
+    }
+}
+
+TEST(Creases, APanelThatStartsFoldedAlongBentOnesStartsInOnePiece) {
+  PatternPanel bent = rectangle("front", 0.2, 0.3);
+  bent.creases = {{{{0.06, 0}, {0.06, 0.15}, {0.08, 0.3}}, 3, -2},
+                  {{{0.14, 0.3}, {0.13, 0.1}, {0.13, 0}}, -3, 2.5}};
+  const Garment garment = built({{bent}, {}}, 0.01);
+  const auto hinges = make_hinges(rest_shape(*complete(garment.mesh)), garment.mesh.folds,
+                                  {BendStiffness{1, 1, 1}});
+  Matrix3Xd x(3, std::ssize(garment.mesh.start));
+  for (Eigen::Index i = 0; i < x.cols(); ++i) x.col(i) = garment.mesh.start[static_cast<std::size_t>(i)];
+  for (const Hinge& hinge : hinges) EXPECT_NEAR(std::abs(angle_of(hinge, x)), 2.25, 0.3);
+  // its triangles are stretched, or turned out of a plane, by what its creases are bent
+  for (const auto& triangle : garment.mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto a = static_cast<std::size_t>(triangle[k]),
+                 b = static_cast<std::size_t>(triangle[(k + 1) % 3]);
+      const double length = (garment.mesh.flat[a] - garment.mesh.flat[b]).norm();
+      EXPECT_NEAR((garment.mesh.start[a] - garment.mesh.start[b]).norm(), length, 0.3 * length);
+    }
+}
+
 TEST(Creases, WhatCannotBeCreasedIsToldOfByPanelAndCrease) {
   const auto told = [](const PatternPanel& panel, const char* field, const char* message,
                        double edge = 0.01) {
@@ -255,6 +312,16 @@ TEST(Creases, WhatCannotBeCreasedIsToldOfByPanelAndCrease) {
   const PatternPanel notched = panel("front", {line_to(0.2, 0), line_to(0.2, 0.3),
                                                line_to(0.1, 0.1), line_to(0, 0.3), line_to(0, 0)});
   told(creased(notched, {{0.05, 0.2}, {0.15, 0.2}}), "[0].points_m", "leaves it near");
+  const auto started = [](std::vector<Vector2d> points, double angle) {
+    PatternPanel any = creased(std::move(points));
+    any.creases[0].start_angle = angle;
+    return any;
+  };
+  told(started({{0.1, 0}, {0.1, 0.3}}, -3.3), "[0].start_rad", "-3.3 rad is not within");
+  told(started({{0.1, 0}, {0.1, 0.2}}, 1), "[0].start_rad",
+       "is 1 rad, but crease 0 of panel front ends inside it");
+  told(started({{0.1, 0}, {0.1, 0.2}, {0.05, 0.1}, {0.05, 0.3}}, 1), "[0].start_rad",
+       "is 1 rad, but crease 0 of panel front turns back");
   PatternPanel many = rectangle("front", 0.2, 0.3);
   for (int i = 0; i < 65; ++i) many.creases.push_back({{{0.1, 0}, {0.1, 0.3}}, 1});
   told(many, "", "has 65 creases, more than 64");

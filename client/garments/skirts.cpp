@@ -101,7 +101,7 @@ v1::Pattern make_skirt(const DressForm& form) {
 // other one to its front; side seams are in the middle of such a pleat.
 v1::Pattern make_pleated_skirt(const DressForm& form) {
   constexpr int kParts = 5;                     // that are seen, of front and back each
-  constexpr double kPressed = 3, kStart = 2.6;  // rad
+  constexpr double kPressed = 3, kStart = 2.5;  // rad
   const double waist = waist_of(form), waist_half = waist_half_of(form, -0.01),  // for it is heavy
       hip = form.girth("hip").height, hem = hem_of(form);
   // widths of a part, at the hip and below as at the hip, and of cloth under each side of it, m

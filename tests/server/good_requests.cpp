@@ -231,9 +231,10 @@ std::vector<std::string> known_requests(const std::string& type) {
        "tensile_warp_n_per_m: 100 tensile_weft_n_per_m: 110 shear_n_per_m: 10 "
        "bend_rigidity_warp_n_m: 1e-5 bend_rigidity_weft_n_m: 2e-5 air_drag_kg_per_m2_s: 0.1 } "
        "friction_coefficient: 0.4 damping_kg_per_s: 1e-4 } "
-       "creases { points_m: [0.1, 0.01, 0.1, 0.3] fold_rad: 2 start_rad: 1.5 } } "
+       "creases { points_m: [0.1, 0.08, 0.1, 0.25] fold_rad: 2 } } "
        "panels { name: 'back' edges { points_m: [0.2, 0] } edges { points_m: [0.2, 0.3] } "
-       "edges { points_m: [0, 0.3] } edges { points_m: [0, 0] } textile { preset: 'denim_11oz' } } "
+       "edges { points_m: [0, 0.3] } edges { points_m: [0, 0] } textile { preset: 'denim_11oz' } "
+       "creases { points_m: [0.1, 0.3, 0.2, 0.15] fold_rad: 2 start_rad: 1.5 } } "
        "seams { first_side { panel: 'front' edge: 3 begin: 0.1 end: 0.9 } "
        "second_side { panel: 'back' edge: 1 begin: 0.2 end: 0.9 } fold_rad: -0.5 } } "
        "edge_m: 0.05"},

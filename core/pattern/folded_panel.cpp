@@ -52,11 +52,72 @@ std::pair<Vector2d, Vector2d> longest_of(const std::vector<Vector2d>& line) {
   return {line[longest - 1], line[longest]};
 }
 
-// A line between two triangles: of which crease, and whether it runs as that does.
-struct CreaseLine {
+// A fold between a part of a panel and the part that stays, and on which side of it that is.
+struct CrossedFold {
   int crease;
-  bool is_along;
+  bool is_left;
 };
+// From the part that stays outwards.
+using Way = std::vector<CrossedFold>;
+
+std::vector<FoldLine> fold_lines(const PatternPanel& panel,
+                                 const std::vector<std::vector<int>>& creases,
+                                 const PanelMesh& mesh, bool is_turned) {
+  std::vector<FoldLine> lines;
+  for (std::size_t c = 0; c < creases.size(); ++c) {
+    std::vector<Vector2d> points;
+    for (const int i : creases[c]) points.push_back(mesh.points[as_index(i)]);
+    // a straight one may have been moved to the outline
+    const auto [begin, end] = longest_of(panel.creases[c].points);
+    const bool is_straight = panel.creases[c].points.size() == 2;
+    const Vector2d along = is_straight ? points.back() - points.front() : end - begin;
+    const double angle = panel.creases[c].start_angle;
+    lines.emplace_back(std::move(points), along, is_turned ? -angle : angle);
+  }
+  return lines;
+}
+
+// Of each triangle.
+std::vector<Way> find_ways(const PatternPanel& panel, const std::vector<std::vector<int>>& creases,
+                           const PanelMesh& mesh, int fixed) {
+  using Line = std::pair<int, int>;
+  const auto line_of = [&](std::size_t t, std::size_t k) -> Line {
+    return {mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]};
+  };
+  std::map<Line, std::size_t> triangle_at;  // that runs so around, anticlockwise
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) triangle_at[line_of(t, k)] = t;
+  std::map<Line, CrossedFold> fold_at;  // of which that triangle is beyond
+  for (std::size_t c = 0; c < creases.size(); ++c)
+    for (std::size_t i = 1; panel.creases[c].start_angle != 0 && i < creases[c].size(); ++i) {
+      const int from = creases[c][i - 1], to = creases[c][i];
+      fold_at[{from, to}] = {static_cast<int>(c), true};
+      fold_at[{to, from}] = {static_cast<int>(c), false};
+    }
+
+  std::vector<Way> ways(mesh.triangles.size());
+  const auto first = std::ranges::find_if(mesh.triangles, [&](const auto& triangle) {
+    return std::ranges::count(triangle, fixed) > 0;
+  });
+  std::vector<std::size_t> to_visit = {static_cast<std::size_t>(first - mesh.triangles.begin())};
+  std::vector<bool> is_known(mesh.triangles.size());
+  is_known[to_visit[0]] = true;
+  while (!to_visit.empty()) {
+    const std::size_t t = to_visit.back();
+    to_visit.pop_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto [from, to] = line_of(t, k);
+      const auto other = triangle_at.find({to, from});
+      if (other == triangle_at.end() || is_known[other->second]) continue;
+      is_known[other->second] = true;
+      ways[other->second] = ways[t];
+      if (const auto fold = fold_at.find({to, from}); fold != fold_at.end())
+        ways[other->second].push_back(fold->second);
+      to_visit.push_back(other->second);
+    }
+  }
+  return ways;
+}
 
 }  // namespace
 
@@ -68,82 +129,22 @@ bool starts_folded(const PatternPanel& panel) {
 bool leads_on(const std::vector<Vector2d>& line) {
   const auto [from, to] = longest_of(line);
   for (std::size_t i = 1; i < line.size(); ++i)
-    if (!((line[i] - line[i - 1]).dot(to - from) > 0)) return false;
+    if (line[i] != line[i - 1] && !((line[i] - line[i - 1]).dot(to - from) > 0)) return false;
   return true;
 }
 
 std::vector<Vector3d> folded_points(const PatternPanel& panel,
                                     const std::vector<std::vector<int>>& creases,
                                     const PanelMesh& mesh, int fixed, bool is_turned) {
-  std::vector<FoldLine> folds;
-  std::map<std::pair<int, int>, CreaseLine> crease_lines;
-  for (std::size_t c = 0; c < creases.size(); ++c) {
-    std::vector<Vector2d> points;
-    for (const int i : creases[c]) points.push_back(mesh.points[as_index(i)]);
-    // a straight one may have been moved to the outline
-    const auto [begin, end] = longest_of(panel.creases[c].points);
-    const bool is_straight = panel.creases[c].points.size() == 2;
-    const Vector2d along = is_straight ? points.back() - points.front() : end - begin;
-    const double angle = panel.creases[c].start_angle;
-    folds.emplace_back(std::move(points), along, is_turned ? -angle : angle);
-    for (std::size_t i = 1; angle != 0 && i < creases[c].size(); ++i) {
-      const int from = creases[c][i - 1], to = creases[c][i];
-      crease_lines[{from, to}] = {static_cast<int>(c), true};
-      crease_lines[{to, from}] = {static_cast<int>(c), false};
-    }
-  }
-
-  // each triangle's line from a point to a point, anticlockwise
-  std::map<std::pair<int, int>, std::size_t> triangle_at;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    for (std::size_t k = 0; k < 3; ++k)
-      triangle_at[{mesh.triangles[t][k], mesh.triangles[t][(k + 1) % 3]}] = t;
-
-  // the folds between a part of the panel and the one that stays, and whether it lies left of them
-  using Way = std::vector<std::pair<int, bool>>;
-  std::vector<Way> ways = {{}};
-  constexpr int kUnknown = -1;
-  std::vector<int> part_of(mesh.triangles.size(), kUnknown);
-  const auto first = std::ranges::find_if(mesh.triangles, [&](const auto& triangle) {
-    return std::ranges::count(triangle, fixed) > 0;
-  });
-  std::vector<std::size_t> to_visit = {static_cast<std::size_t>(first - mesh.triangles.begin())};
-  part_of[to_visit[0]] = 0;
-  std::map<std::pair<int, int>, int> parts_beyond;  // of a part, and a crease
-  while (!to_visit.empty()) {
-    const std::size_t t = to_visit.back();
-    to_visit.pop_back();
-    const int part = part_of[t];
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::pair line{mesh.triangles[t][(k + 1) % 3],
-                           mesh.triangles[t][k]};  // as the other has it
-      const auto other = triangle_at.find(line);
-      if (other == triangle_at.end() || part_of[other->second] != kUnknown) continue;
-      const auto crease = crease_lines.find(line);
-      int& beyond = part_of[other->second];
-      if (crease == crease_lines.end()) {
-        beyond = part;
-      } else {
-        const auto [at, is_new] =
-            parts_beyond.try_emplace({part, crease->second.crease}, static_cast<int>(ways.size()));
-        if (is_new) {
-          ways.push_back(ways[as_index(part)]);
-          ways.back().emplace_back(crease->second.crease, crease->second.is_along);
-        }
-        beyond = at->second;
-      }
-      to_visit.push_back(other->second);
-    }
-  }
-
+  const std::vector<FoldLine> lines = fold_lines(panel, creases, mesh, is_turned);
+  const std::vector<Way> ways = find_ways(panel, creases, mesh, fixed);
   std::vector<Vector3d> folded(mesh.points.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
     for (const int i : mesh.triangles[t]) {
       const Vector2d& point = mesh.points[as_index(i)];
       Vector3d at(point.x(), point.y(), 0);
-      const Way& way = ways[as_index(part_of[t])];
-      for (auto fold = way.rbegin(); fold != way.rend(); ++fold)
-        at = folds[as_index(fold->first)].fold(point, at, fold->second);
+      for (auto fold = ways[t].rbegin(); fold != ways[t].rend(); ++fold)
+        at = lines[as_index(fold->crease)].fold(point, at, fold->is_left);
       folded[as_index(i)] = at;
     }
   return folded;

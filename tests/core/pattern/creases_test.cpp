@@ -274,7 +274,8 @@ TEST(Creases, APanelThatStartsFoldedAlongBentOnesStartsInOnePiece) {
   const auto hinges = make_hinges(rest_shape(*complete(garment.mesh)), garment.mesh.folds,
                                   {BendStiffness{1, 1, 1}});
   Matrix3Xd x(3, std::ssize(garment.mesh.start));
-  for (Eigen::Index i = 0; i < x.cols(); ++i) x.col(i) = garment.mesh.start[static_cast<std::size_t>(i)];
+  for (Eigen::Index i = 0; i < x.cols(); ++i)
+    x.col(i) = garment.mesh.start[static_cast<std::size_t>(i)];
   for (const Hinge& hinge : hinges) EXPECT_NEAR(std::abs(angle_of(hinge, x)), 2.25, 0.3);
   // its triangles are stretched, or turned out of a plane, by what its creases are bent
   for (const auto& triangle : garment.mesh.triangles)

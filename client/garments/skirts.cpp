@@ -88,7 +88,7 @@ v1::Pattern make_skirt(const DressForm& form) {
     draft.sew({name, {"dart-3"}}, {name, {"dart-4"}});
     draft.sew({name, {"waist-1", "waist-2", "waist-3"}}, {"band-" + name, {"lower"}});
   }
-  for (const std::string side : kSides) {
+  for (const char* side : kSides) {
     const std::string label = of_side("side", side);
     draft.sew({"front", {label}}, {"back", {label}});
     draft.sew({"front", {"low-" + label}}, {"back", {"low-" + label}});
@@ -100,8 +100,8 @@ v1::Pattern make_skirt(const DressForm& form) {
 // Between two parts that are seen cloth goes under the one, back under both, and from under the
 // other one to its front; side seams are in the middle of such a pleat.
 v1::Pattern make_pleated_skirt(const DressForm& form) {
-  constexpr int kParts = 5;                     // that are seen, of front and back each
-  constexpr double kPressed = 3, kStart = 2.5;  // rad
+  constexpr int kParts = 5, kMiddle = kParts / 2;  // that are seen, of front and back each
+  constexpr double kPressed = 3, kStart = 2.5;     // rad
   const double waist = waist_of(form), waist_half = waist_half_of(form, -0.01),  // for it is heavy
       hip = form.girth("hip").height, hem = hem_of(form);
   // widths of a part, at the hip and below as at the hip, and of cloth under each side of it, m
@@ -109,9 +109,9 @@ v1::Pattern make_pleated_skirt(const DressForm& form) {
                at_hip = std::max(at_waist, (form.girth("hip").wanted + 0.06) / 2 / kParts);
   const double under = std::max(0.42 * at_waist - (at_hip - at_waist) / 4, 0.01);
   const double each = at_hip + 4 * under;
-  const double half = kParts / 2 * each + each / 2;  // of front or back
+  const double half = kMiddle * each + each / 2;  // of front or back
   // mirrored to the last bit, and so rounded alike
-  const auto middle_of = [&](int k) { return (kParts / 2 - k) * each; };
+  const auto middle_of = [&](int k) { return (kMiddle - k) * each; };
   const auto edge_at = [&](double width) { return width / 2; };
   const auto fold_at = [&](double width) { return (each + width) / 4; };
 
@@ -164,7 +164,7 @@ v1::Pattern make_pleated_skirt(const DressForm& form) {
     add_band(draft, band_of(form, waist_half, front), place, front);
     draft.sew({name, seen}, {"band-" + name, {"lower"}});
   }
-  for (const std::string side : kSides)
+  for (const char* side : kSides)
     for (const std::string part : {"", "band-"})
       draft.sew({part + "front", {of_side("side", side)}},
                 {part + "back", {of_side("side", side)}});

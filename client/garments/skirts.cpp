@@ -139,9 +139,10 @@ v1::Pattern make_pleated_skirt(const DressForm& form) {
     outline.line(of_side("side", there).c_str(), {-half, hem});
     outline.line("hem", {0, hem});
 
-    const double z = std::sin(kStart) * fold_at(at_waist);
+    // pleats and room beside them: pressed onto the body while seams close they fold elsewhere
+    const double room = std::sin(kStart) * fold_at(at_waist);
     PanelPlace place = place_of(outline, body, front);
-    place.origin.z() += front ? z : -z;
+    place.origin.z() += front ? room : -room;
     draft.add(name, outline, place);
     for (int k = 0; k < kParts; ++k) {
       const double middle = middle_of(k);

@@ -229,6 +229,18 @@ TEST(Creases, AFreePanelComesToRestAtTheirAngle) {
   }
 }
 
+// Of its folds, at their edges, as it starts.
+std::vector<double> start_angles(const Garment& garment) {
+  const auto hinges = make_hinges(rest_shape(*complete(garment.mesh)), garment.mesh.folds,
+                                  {BendStiffness{1, 1, 1}});
+  Matrix3Xd x(3, std::ssize(garment.mesh.start));
+  for (Eigen::Index i = 0; i < x.cols(); ++i)
+    x.col(i) = garment.mesh.start[static_cast<std::size_t>(i)];
+  std::vector<double> angles;
+  for (const Hinge& hinge : hinges) angles.push_back(angle_of(hinge, x));
+  return angles;
+}
+
 // Its particle at that place of the flat shape.
 Vector3d start_at(const Garment& garment, const Vector2d& flat) {
   for (std::size_t i = 0; i < garment.mesh.flat.size(); ++i)
@@ -266,17 +278,23 @@ TEST(Creases, APanelStartsFoldedByTheirAnglesAndTheRestOfItStaysWhereItIsPlaced)
     }
 }
 
+TEST(Creases, APanelThatASeamTurnsOverStartsFoldedToTheSameSideOfItsCloth) {
+  // both lie in one place, with the left edges sewn: one of them is turned over
+  PatternPanel front = creased({{0.1, 0}, {0.1, 0.3}}), back = front;
+  back.name = "back";
+  for (PatternPanel* panel : {&front, &back}) panel->creases[0].start_angle = 1.2;
+  const Garment garment = built({{front, back}, {{{{"front", 3}}, {{"back", 3}}, true}}}, 0.02);
+  EXPECT_EQ(garment.notes.at(0).code, "PANEL_TURNED");
+  ASSERT_THAT(garment.mesh.folds, SizeIs(2));
+  EXPECT_THAT(start_angles(garment), ::testing::Each(::testing::DoubleNear(1.2, 1e-9)));
+}
+
 TEST(Creases, APanelThatStartsFoldedAlongBentOnesStartsInOnePiece) {
   PatternPanel bent = rectangle("front", 0.2, 0.3);
   bent.creases = {{{{0.06, 0}, {0.06, 0.15}, {0.08, 0.3}}, 3, -2},
                   {{{0.14, 0.3}, {0.13, 0.1}, {0.13, 0}}, -3, 2.5}};
   const Garment garment = built({{bent}, {}}, 0.01);
-  const auto hinges = make_hinges(rest_shape(*complete(garment.mesh)), garment.mesh.folds,
-                                  {BendStiffness{1, 1, 1}});
-  Matrix3Xd x(3, std::ssize(garment.mesh.start));
-  for (Eigen::Index i = 0; i < x.cols(); ++i)
-    x.col(i) = garment.mesh.start[static_cast<std::size_t>(i)];
-  for (const Hinge& hinge : hinges) EXPECT_NEAR(std::abs(angle_of(hinge, x)), 2.25, 0.3);
+  for (const double angle : start_angles(garment)) EXPECT_NEAR(std::abs(angle), 2.25, 0.3);
   // its triangles are stretched, or turned out of a plane, by what its creases are bent
   for (const auto& triangle : garment.mesh.triangles)
     for (std::size_t k = 0; k < 3; ++k) {

@@ -158,7 +158,7 @@ void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPoo
   const double steps =
       std::clamp(separation_.most_steps(), 1.0, static_cast<double>(window_.most_steps));
   if (!ends_frame) window_.most_steps = static_cast<int>(steps);
-  separation_.separate(steps, ways);
+  separation_.separate(steps);
   write(sheets);
 }
 
@@ -233,8 +233,8 @@ void ClothContact::write(std::span<MovingSheet> sheets) {
     own_d_.resize(3, end - first);
     changed_.clear();
     Eigen::Index n = 0;
-    for (const int i : separation_.particles()) {
-      if (i < first || i >= end) continue;
+    for (int i = first; i < end; ++i) {
+      if (!separation_.has_moved(i)) continue;
       const Mover& mover = separation_.mover(i);
       const Vector3d by = mover.way.head<3>() - (x_.col(i) - begin_.col(i)),
                      in_step = mover.in_step.head<3>() - d_.col(i);

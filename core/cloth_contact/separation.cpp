@@ -15,7 +15,7 @@ namespace {
 constexpr int kMostPasses = 12;
 // of thickness: what others need not answer; the next window begins with what was given in this one
 constexpr double kSmall = 1e-4;
-constexpr int kElsewhere = -1;
+constexpr int kNever = -1;
 constexpr double kDepthShare = 0.2;  // of its depth that a pair is moved apart
 
 std::size_t hash(const std::array<int, 4>& particle) {
@@ -29,7 +29,8 @@ std::size_t hash(const std::array<int, 4>& particle) {
 void Separation::touch(std::span<const NearCloth> near, const Untangling& untangling,
                        const Ways& ways, double most, int layers, ThreadPool& pool) {
   constexpr std::int64_t kLeastShare = 64;  // lists, of a thread
-  const Surroundings around{untangling, ways, most, static_cast<double>(layers)};
+  if (!near.empty()) set_out(ways, pool);
+  const Surroundings around{untangling, ways, movers_, most, static_cast<double>(layers)};
   const std::size_t shares = shares_of(pool, std::ssize(near), kLeastShare);
   found_.resize(2 * shares);
   for (const bool edges : {false, true})
@@ -96,17 +97,18 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   constexpr double kLeastMoves = 0.01;      // of its lightest particle's 1 / mass
   constexpr double kMostGivenIfHeld = 0.1;  // of the thickness
   // of all of the one to all of the other, m^2
-  const auto farthest = [&](Eigen::Vector4d (Ways::*motion)(int) const) {
-    std::array<Eigen::Vector4d, 4> by;
-    for (std::size_t n = 0; n < 4; ++n) by[n] = (around.ways.*motion)(candidate.particle[n]);
+  const std::size_t ends = edges ? 2 : 1;
+  const auto farthest = [&](Eigen::Vector4d Mover::*motion) {
+    const auto by = [&](std::size_t n) -> const Eigen::Vector4d& {
+      return around.movers[static_cast<std::size_t>(candidate.particle[n])].*motion;
+    };
     double most = 0;
-    const std::size_t ends = edges ? 2 : 1;
     for (std::size_t m = 0; m < ends; ++m)
-      for (std::size_t n = ends; n < 4; ++n) most = std::max(most, (by[m] - by[n]).squaredNorm());
+      for (std::size_t n = ends; n < 4; ++n) most = std::max(most, (by(m) - by(n)).squaredNorm());
     return most;
   };
   const double room = distance - candidate.thickness;
-  if (room >= around.most || (room > 0 && room * room >= farthest(&Ways::way))) return;
+  if (room >= around.most || (room > 0 && room * room >= farthest(&Mover::way))) return;
   if (!around.untangling.empty() && around.untangling.has(candidate.particle)) return;
 
   std::array<double, 4> share;
@@ -118,14 +120,14 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
     share[n] = weight[n] * inverse;
     moves += weight[n] * share[n];
     lightest = std::max(lightest, inverse);
-    if (inverse == 0) is_held[n < (edges ? 2 : 1) ? 0 : 1] = true;
+    if (inverse == 0) is_held[n < ends ? 0 : 1] = true;
   }
   // what is held there, or moves far where its nearest point moves little, stays as it is
   if (moves <= kLeastMoves * lightest) return;
   for (double& part : share) part /= moves;
   const double reach =
       std::max(std::min(distance / 2, candidate.thickness / 4), kLeastReach * candidate.thickness);
-  const double in_step = farthest(&Ways::last);
+  const double in_step = farthest(&Mover::in_step);
   if (in_step > 0) found.most_steps = std::min(found.most_steps, reach / std::sqrt(in_step));
 
   Contact& contact = found.contacts.emplace_back();
@@ -141,26 +143,22 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
       (is_held[0] && is_held[1] ? kMostGivenIfHeld : around.layers) * candidate.thickness;
 }
 
-// Has the particles of all contacts begin with their own ways.
-void Separation::set_out(const Ways& ways) {
-  movers_.resize(ways.inverse_mass.size());
-  changed_.resize(movers_.size(), kElsewhere);
-  for (const int i : particles_) changed_[static_cast<std::size_t>(i)] = kElsewhere;
-  particles_.clear();
-  for_each_contact([&](const Contact& contact) {
-    for (const int i : contact.particle) {
-      const auto at = static_cast<std::size_t>(i);
-      if (changed_[at] != kElsewhere) continue;
-      changed_[at] = 0;
-      movers_[at] = {ways.way(i), ways.last(i)};
-      particles_.push_back(i);
+// Has particles begin with their own ways.
+void Separation::set_out(const Ways& ways, ThreadPool& pool) {
+  const Eigen::Index count = ways.from.cols();
+  movers_.resize(static_cast<std::size_t>(count));
+  for_shares(pool, count, kParticlesOfShare, [&](std::int64_t begin, std::int64_t end) {
+    for (Eigen::Index i = begin; i < end; ++i) {
+      Mover& mover = movers_[static_cast<std::size_t>(i)];
+      mover.way << ways.to.col(i) - ways.from.col(i), 0;
+      mover.in_step << ways.in_step.col(i), 0;
     }
   });
 }
 
 // Those are looked at again whose particles others have moved.
-void Separation::separate(double steps, const Ways& ways) {
-  set_out(ways);
+void Separation::separate(double steps) {
+  changed_.assign(movers_.size(), kNever);
   // what was given the last time
   std::size_t next = 0;  // most pairs come in the order in which they came then
   for_each_contact([&](Contact& contact) {
@@ -173,13 +171,8 @@ void Separation::separate(double steps, const Ways& ways) {
     };
     contact.way = turned(given_[found].way);
     contact.in_step = turned(given_[found].in_step);
-    const Eigen::Vector4d way = contact.way.along * normal + contact.way.sliding,
-                          in_step = contact.in_step.along * normal + contact.in_step.sliding;
-    for (std::size_t n = 0; n < 4; ++n) {
-      Mover& mover = movers_[static_cast<std::size_t>(contact.particle[n])];
-      mover.way += contact.share[n] * way;
-      mover.in_step += contact.share[n] * in_step;
-    }
+    move(contact, contact.way.along * normal + contact.way.sliding,
+         contact.in_step.along * normal + contact.in_step.sliding);
   });
 
   int now = 0;
@@ -218,15 +211,23 @@ Eigen::Vector4d Separation::give(const Eigen::Vector4d& motion, const Eigen::Vec
   return by;
 }
 
+void Separation::move(const Contact& contact, const Eigen::Vector4d& way,
+                      const Eigen::Vector4d& in_step) {
+  for (std::size_t n = 0; n < 4; ++n) {
+    const auto at = static_cast<std::size_t>(contact.particle[n]);
+    movers_[at].way += contact.share[n] * way;
+    movers_[at].in_step += contact.share[n] * in_step;
+    changed_[at] = std::max(changed_[at], 0);
+  }
+}
+
 // Returns how far it was from what it is to be, m.
 double Separation::separate(double steps, Contact& contact) {
-  const auto mover = [&](std::size_t n) -> Mover& {
-    return movers_[static_cast<std::size_t>(contact.particle[n])];
-  };
   Eigen::Vector4d way = Eigen::Vector4d::Zero(), in_step = Eigen::Vector4d::Zero();
   for (std::size_t n = 0; n < 4; ++n) {
-    way += contact.weight[n] * mover(n).way;
-    in_step += contact.weight[n] * mover(n).in_step;
+    const Mover& mover = movers_[static_cast<std::size_t>(contact.particle[n])];
+    way += contact.weight[n] * mover.way;
+    in_step += contact.weight[n] * mover.in_step;
   }
 
   const Eigen::Vector4d& normal = contact.normal;
@@ -244,10 +245,7 @@ double Separation::separate(double steps, Contact& contact) {
   // nor in the steps to come
   const Eigen::Vector4d braked =
       give(in_step, normal, allowed(come + pushed), contact.friction, 0, contact.in_step);
-  for (std::size_t n = 0; n < 4; ++n) {
-    mover(n).way += contact.share[n] * by;
-    mover(n).in_step += contact.share[n] * braked;
-  }
+  move(contact, by, braked);
   return std::max(std::abs(pushed), std::abs(contact.in_step.along - braked_before) * steps);
 }
 
@@ -256,11 +254,7 @@ void Separation::give_up(Contact& contact) {
   const auto of = [&](const Change& given) -> Eigen::Vector4d {
     return given.along * contact.normal + given.sliding;
   };
-  for (std::size_t n = 0; n < 4; ++n) {
-    Mover& mover = movers_[static_cast<std::size_t>(contact.particle[n])];
-    mover.way -= contact.share[n] * of(contact.way);
-    mover.in_step -= contact.share[n] * of(contact.in_step);
-  }
+  move(contact, -of(contact.way), -of(contact.in_step));
   contact.way = contact.in_step = {};
 }
 

@@ -44,17 +44,6 @@ class Separation {
   struct Ways {
     const Matrix3Xd &from, &to, &in_step;
     std::span<const double> inverse_mass;
-
-    Eigen::Vector4d way(int particle) const {
-      Eigen::Vector4d way;
-      way << to.col(particle) - from.col(particle), 0;
-      return way;
-    }
-    Eigen::Vector4d last(int particle) const {
-      Eigen::Vector4d last;
-      last << in_step.col(particle), 0;
-      return last;
-    }
   };
   // Finds the candidates that may have come nearer than their thickness on their way, as far as
   // they came less far than `most` (m) in relation to each other, without those that are led apart.
@@ -68,9 +57,9 @@ class Separation {
   // distance, nor slides that far.
   double most_steps() const { return most_steps_; }
   // Of as many steps as are to come until contact acts again.
-  void separate(double steps, const Ways& ways);
-  // Particles of those found, and where separate() had them move.
-  std::span<const int> particles() const { return particles_; }
+  void separate(double steps);
+  // Whether separate() moved a particle, and where to.
+  bool has_moved(int particle) const { return changed_[static_cast<std::size_t>(particle)] >= 0; }
   const Mover& mover(int particle) const { return movers_[static_cast<std::size_t>(particle)]; }
   // Has pairs begin with nothing the next time.
   void forget_given();
@@ -83,13 +72,14 @@ class Separation {
   };
   // Weights lead from the second one's nearest point to the first one's; shares are what particles
   // have of the pair's motion.
-  struct Contact {
+  struct alignas(64) Contact {
     std::array<int, 4> particle = {};
+    std::array<double, 4> weight = {};
+    int looked_at = -2;  // when
     bool edges = false;
-    int looked_at = -1;  // when
-    std::array<double, 4> weight = {}, share = {};
+    double room = 0;  // to its thickness, where it set out, m
+    std::array<double, 4> share = {};
     Eigen::Vector4d normal = {};
-    double room = 0;                     // to its thickness, where it set out, m
     double thickness = 0, friction = 0;  // m, 1
     double most_given = 0;               // along the normal, m
     Change way = {}, in_step = {};       // that it has given, m
@@ -102,6 +92,7 @@ class Separation {
   struct Surroundings {
     const Untangling& untangling;
     const Ways& ways;
+    std::span<const Mover> movers;
     double most, layers;
   };
   struct Found {
@@ -114,13 +105,14 @@ class Separation {
   static void add(bool edges, const Candidate& candidate, const std::array<double, 4>& weight,
                   const Vector3d& apart, double distance, double friction,
                   const Surroundings& around, Found& found);
-  void set_out(const Ways& ways);
+  void set_out(const Ways& ways, ThreadPool& pool);
   template <class F>
   void for_each_contact(const F& f) {
     for (Found& found : found_) std::ranges::for_each(found.contacts, f);
   }
   static Eigen::Vector4d give(const Eigen::Vector4d& motion, const Eigen::Vector4d& normal,
                               double least, double friction, double free, Change& given);
+  void move(const Contact& contact, const Eigen::Vector4d& way, const Eigen::Vector4d& in_step);
   double separate(double steps, Contact& contact);
   void give_up(Contact& contact);
   std::size_t find_given(const Contact& contact, std::size_t next) const;
@@ -129,9 +121,8 @@ class Separation {
   std::vector<Given> given_;          // the last time, of pairs that gave something
   std::vector<std::uint32_t> place_;  // in given_ and one more, by hash of the pair; 0: none
   std::vector<Found> found_;          // in their order: corners in shares, edges in shares
-  std::vector<int> particles_;
-  std::vector<Mover> movers_;  // of particles_; of others as they were
-  std::vector<int> changed_;   // when, the same; others: kElsewhere
+  std::vector<Mover> movers_;         // all particles
+  std::vector<int> changed_;          // when, the same; 0: by little, or before the first turn
   double most_steps_ = 0;
 };
 

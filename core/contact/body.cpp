@@ -50,7 +50,8 @@ double cell_of(const BodyMesh& mesh, const BodySettings& settings) {
 
 class GridMaker {
  public:
-  GridMaker(const BodyMesh& mesh, double cell, double reach) : mesh_(mesh), tree_(mesh) {
+  GridMaker(const BodyMesh& mesh, double cell, double reach)
+      : mesh_(mesh), tree_(mesh), around_(tree_) {
     const auto box = box_of(mesh);
     grid_.cell = cell;
     grid_.reach = reach;
@@ -65,6 +66,7 @@ class GridMaker {
   DistanceGrid make() {
     const auto [columns, rows, layers] = grid_.blocks;
     winding_.emplace(mesh_, grid_.low, grid_.cell, rows * kCells + 1, layers * kCells + 1);
+    measure_gaps();
     for (int z = 0; z < layers; ++z)
       for (int y = 0; y < rows; ++y)
         for (int x = 0; x < columns; ++x) add_block({x, y, z});
@@ -79,16 +81,69 @@ class GridMaker {
 
  private:
   using Corner = std::array<int, 3>;  // in cells from grid_.low
+  static constexpr int kNoGap = 1 << 24;
+
+  // From each block to the nearest that may have some of the surface in it, squared, in blocks.
+  void measure_gaps() {
+    gaps_.assign(static_cast<std::size_t>(grid_.blocks[0] * grid_.blocks[1] * grid_.blocks[2]),
+                 kNoGap);
+    for (const auto& [i, j, k] : mesh_.triangles) mark(vertex(i), vertex(j), vertex(k));
+    std::vector<int> line;
+    for (std::size_t axis = 0, stride = 1; axis < 3; ++axis) {
+      const auto count = static_cast<std::size_t>(grid_.blocks[axis]);
+      for (std::size_t first = 0; first < gaps_.size(); ++first) {
+        if (first / stride % count != 0) continue;
+        line.clear();
+        for (std::size_t n = 0; n < count; ++n) line.push_back(gaps_[first + n * stride]);
+        for (std::size_t n = 0; n < count; ++n) gaps_[first + n * stride] = least_gap(line, n);
+      }
+      stride *= count;
+    }
+  }
+
+  // Of those on a line through a block, each with its own gap beside the line.
+  static int least_gap(const std::vector<int>& line, std::size_t at) {
+    int least = kNoGap;
+    for (std::size_t n = 0; n < line.size(); ++n) {
+      const int between = std::max(std::abs(static_cast<int>(n) - static_cast<int>(at)) - 1, 0);
+      least = std::min(least, line[n] + between * between);
+    }
+    return least;
+  }
+
+  // Blocks that a triangle may have a part in.
+  void mark(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+    const double size = kCells * grid_.cell, half_diagonal = std::sqrt(0.75) * size;
+    const auto block_of = [&](const Vector3d& point, double beyond) -> Eigen::Array3i {
+      return ((point - grid_.low).array() / size + beyond).floor().cast<int>();
+    };
+    constexpr double kRounding = 1e-9;  // of a block
+    const Eigen::Array3i first = block_of(a.cwiseMin(b).cwiseMin(c), -kRounding),
+                         last = block_of(a.cwiseMax(b).cwiseMax(c), kRounding);
+    const Vector3d normal = (b - a).cross(c - a).stableNormalized();
+    for (int z = first.z(); z <= last.z(); ++z)
+      for (int y = first.y(); y <= last.y(); ++y)
+        for (int x = first.x(); x <= last.x(); ++x)
+          if (std::abs((place({x, y, z}, kCells / 2.0) - a).dot(normal)) <=
+              half_diagonal * (1 + kRounding))
+            gaps_[index({x, y, z})] = 0;
+  }
 
   void add_block(const Corner& block) {
+    constexpr double kLooked = 3;  // blocks: farther away a gap is near enough to the distance
     const double cell = grid_.cell, half_diagonal = std::sqrt(0.75) * kCells * cell;
+    const double gap = std::sqrt(gaps_[index(block)]);  // blocks
+    const bool inside = winding_number(corner(block, {0, 0, 0})) > 0;
+    double distance = 0, clear = gap * kCells * cell;  // of every corner, at least
     const Vector3d middle = place(block, kCells / 2.0);
-    nearest_ = tree_.nearest(middle, nearest_.triangle < 0 ? 0 : nearest_.triangle);
-    const double clear = std::sqrt(nearest_.squared) - half_diagonal;  // of every corner
-    const Corner first = corner(block, {0, 0, 0});
-    const bool inside = winding_number(first) > 0;
+    if (gap < kLooked || clear < grid_.reach) {
+      nearest_ = tree_.nearest(middle, nearest_.triangle);
+      distance = std::sqrt(nearest_.squared);
+      clear = distance - half_diagonal;
+    }
     if (!inside && clear >= grid_.reach) return add_far(clear);
     const bool deep = inside && clear >= cell;
+    if (!deep) around_.set(middle, half_diagonal, distance);
     const auto begin = static_cast<std::int32_t>(grid_.values.size());
     grid_.begin.push_back(deep ? ~begin : begin);
     const int step = deep ? kCells : 1;
@@ -113,7 +168,10 @@ class GridMaker {
   float value_deep(const Corner& block, const Corner& in_block) {
     const Corner at = corner(block, in_block);
     const auto [found, is_new] = deep_.try_emplace(at);
-    if (is_new) found->second = value_at(at);
+    if (is_new) {
+      nearest_ = tree_.nearest(place(at, 0, 1), nearest_.triangle);
+      found->second = value_at(at);
+    }
     return found->second;
   }
 
@@ -121,12 +179,13 @@ class GridMaker {
     for (std::size_t axis = 0; axis < 3; ++axis)
       if (in_block[axis] == 0)
         if (const auto known = value_of_neighbour(block, in_block, axis)) return *known;
-    return value_at(corner(block, in_block));
+    const Corner at = corner(block, in_block);
+    nearest_ = around_.nearest(place(at, 0, 1), nearest_.triangle);
+    return value_at(at);
   }
 
+  // Whose nearest triangle is known.
   float value_at(const Corner& at) {
-    const Vector3d point = place(at, 0, 1);
-    nearest_ = tree_.nearest(point, nearest_.triangle);
     const int winding = winding_number(at);
     if (winding < 0 && inside_out_ < 0) inside_out_ = nearest_.triangle;
     if (winding > 1 && overlapping_ < 0) overlapping_ = nearest_.triangle;
@@ -139,14 +198,17 @@ class GridMaker {
     if (block[axis] == 0) return std::nullopt;
     --block[axis];
     in_block[axis] = kLastCorner;
-    const auto index = static_cast<std::size_t>(
-        (block[2] * grid_.blocks[1] + block[1]) * grid_.blocks[0] + block[0]);
-    const std::int32_t begin = grid_.begin[index];
+    const std::int32_t begin = grid_.begin[index(block)];
     if (begin < 0) return std::nullopt;
     const int i = (in_block[2] * kCorners + in_block[1]) * kCorners + in_block[0];
     return grid_.values[static_cast<std::size_t>(begin + i)];
   }
 
+  std::size_t index(const Corner& block) const {
+    return static_cast<std::size_t>((block[2] * grid_.blocks[1] + block[1]) * grid_.blocks[0] +
+                                    block[0]);
+  }
+  const Vector3d& vertex(int i) const { return mesh_.vertices[static_cast<std::size_t>(i)]; }
   Corner corner(const Corner& block, const Corner& in_block) const {
     return {block[0] * kCells + in_block[0], block[1] * kCells + in_block[1],
             block[2] * kCells + in_block[2]};
@@ -162,11 +224,13 @@ class GridMaker {
 
   const BodyMesh& mesh_;
   TriangleTree tree_;
+  TriangleTree::Around around_;  // the block that is being added
   std::optional<WindingNumbers> winding_;
   DistanceGrid grid_;
-  TriangleTree::Nearest nearest_;    // of the point before
-  std::map<int, std::int32_t> far_;  // values of blocks outside, by cells beyond the reach
-  std::map<Corner, float> deep_;     // values at corners of blocks deep inside
+  std::vector<int> gaps_;                // see measure_gaps()
+  TriangleTree::Nearest nearest_{0, 0};  // of the point before
+  std::map<int, std::int32_t> far_;      // values of blocks outside, by cells beyond the reach
+  std::map<Corner, float> deep_;         // values at corners of blocks deep inside
   int inside_out_ = -1, overlapping_ = -1;
 };
 

@@ -109,6 +109,54 @@ TriangleTree::Nearest TriangleTree::nearest(const Vector3d& point, int guess) co
   return best;
 }
 
+void TriangleTree::Around::set(const Vector3d& middle, double radius, double distance) {
+  constexpr double kRounding = 1 + 1e-9;
+  const double farthest = (distance + 2 * radius) * kRounding, most = farthest * farthest;
+  middle_ = middle;
+  triangles_.clear();
+  discs_.conservativeResize(std::max<Eigen::Index>(discs_.rows(), 64), 7);
+  std::array<int, kDeepest> open;
+  std::size_t left = 0;
+  open[left++] = 0;
+  while (left > 0) {
+    const int index = open[--left];
+    const Node& node = tree_.nodes_[static_cast<std::size_t>(index)];
+    if (node.box.squaredExteriorDistance(middle) > most) continue;
+    for (int i = node.first; i < node.first + node.count; ++i) {
+      const Disc& disc = tree_.discs_[static_cast<std::size_t>(i)];
+      if (least_squared(disc, middle) > most) continue;
+      const auto row = std::ssize(triangles_);
+      if (row == discs_.rows()) discs_.conservativeResize(2 * row, 7);
+      discs_.row(row) << (disc.middle - middle).cast<float>().transpose(),
+          disc.normal.cast<float>().transpose(), static_cast<float>(disc.radius);
+      triangles_.push_back(tree_.order_[static_cast<std::size_t>(i)]);
+    }
+    if (node.count > 0) continue;
+    open[left++] = node.first;
+    open[left++] = index + 1;
+  }
+}
+
+TriangleTree::Nearest TriangleTree::Around::nearest(const Vector3d& point, int guess) {
+  constexpr float kRounding = 4e-6F;  // of squares, in single precision
+  Nearest best{tree_.squared_distance(guess, point), guess};
+  const auto count = std::ssize(triangles_);
+  const Eigen::Vector3f from = (point - middle_).cast<float>();
+  const auto disc = [&](int k) { return discs_.col(k).head(count).array(); };
+  const auto x = from.x() - disc(0), y = from.y() - disc(1), z = from.z() - disc(2);
+  above_ = (x * disc(3) + y * disc(4) + z * disc(5)).square();
+  squared_ = x.square() + y.square() + z.square();
+  least_ = ((squared_ * (1 - kRounding) - above_).max(0).sqrt() - disc(6)).max(0).square() +
+           above_ - kRounding * squared_;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    if (double{least_[k]} >= best.squared) continue;
+    const int t = triangles_[static_cast<std::size_t>(k)];
+    if (const double squared = tree_.squared_distance(t, point); squared < best.squared)
+      best = {squared, t};
+  }
+  return best;
+}
+
 double TriangleTree::first_hit(int from, const Vector3d& start, const Vector3d& direction) const {
   const Vector3d inverse = direction.cwiseInverse();
   double first = kNone;

@@ -21,6 +21,9 @@ class TriangleTree {
   // The nearest triangle. A guess, any triangle's number, makes it quick where it is near.
   Nearest nearest(const Vector3d& point, int guess) const;
 
+  // Quicker for many points that are close together.
+  class Around;
+
   // Where a ray from within triangle `from` first meets another one, m along `direction`, of length
   // 1; infinity where it does not.
   double first_hit(int from, const Vector3d& start, const Vector3d& direction) const;
@@ -49,6 +52,28 @@ class TriangleTree {
   std::vector<int> order_;
   std::vector<Disc> discs_;  // in that order
   std::vector<Node> nodes_;
+};
+
+// All triangles that may be the nearest to points in a ball, side by side.
+class TriangleTree::Around {
+ public:
+  // Keeps hold of the tree.
+  explicit Around(const TriangleTree& tree) : tree_(tree) {}
+
+  // From now on points are no farther than `radius` from `middle`, m, whose nearest triangle is
+  // so far, m.
+  void set(const Vector3d& middle, double radius, double distance);
+  // As that of the tree.
+  Nearest nearest(const Vector3d& point, int guess);
+
+ private:
+  using Values = Eigen::ArrayXf;  // of each disc, m
+
+  const TriangleTree& tree_;
+  Vector3d middle_ = Vector3d::Zero();
+  std::vector<int> triangles_;
+  Eigen::Matrix<float, Eigen::Dynamic, 7> discs_;  // from middle_: middles; normals; radii
+  Values above_, squared_, least_;
 };
 
 }  // namespace weft

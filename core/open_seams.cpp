@@ -14,23 +14,35 @@ namespace {
 constexpr double kSpacing = 0.01;  // of points that are looked at along an edge, at least, m
 constexpr double kOutward = 1;     // fastest that an edge is pushed out, m/s
 
-// Of an edge what lies within skins, by how deep it is there; else how close it comes.
+// Points that are looked at along an edge, and both ends, are so many parts from each other.
+int parts_of(const Vector3d& from, const Vector3d& to) {
+  return static_cast<int>((to - from).norm() / kSpacing);
+}
+
+// Of an edge what lies within skins, by how deep it is there.
 struct Depth {
   double nearest = std::numeric_limits<double>::infinity();  // m, negative within
-  Vector3d out = Vector3d::Zero();                           // mean direction
-  double share = 0;                                          // of the way to the second end
+  // how far points may come before one is within, or less, m
+  double clear = std::numeric_limits<double>::infinity();
+  Vector3d out = Vector3d::Zero();  // mean direction
+  double share = 0;                 // of the way to the second end
 };
 
-Depth depth_between(const Contacts& contacts, const Vector3d& from, const Vector3d& to) {
-  const int parts = static_cast<int>((to - from).norm() / kSpacing);
+Depth depth_between(const Contacts& contacts, const Vector3d& from, const Vector3d& to, int parts) {
   const double step = (to - from).norm() / parts;
+  // where distances may jump
+  const double sure = std::min(contacts.skin(), 0.0);
   Depth found;
   double sum = 0;
   for (int k = 1; k < parts;) {
     const double share = static_cast<double>(k) / parts;
     const Distance there = contacts.nearest(from + share * (to - from));
     found.nearest = std::min(found.nearest, there.value);
-    k += there.value > step ? static_cast<int>(std::min<double>(parts, there.value / step)) : 1;
+    found.clear = std::min(found.clear, there.value + sure);
+    const int skipped =
+        there.value > step ? static_cast<int>(std::min<double>(parts, there.value / step)) - 1 : 0;
+    if (skipped > 0) found.clear = std::min(found.clear, there.value - skipped * step + sure);
+    k += 1 + skipped;
     if (!(there.value < 0)) continue;
     found.out -= there.value * there.normal;
     found.share -= there.value * share;
@@ -95,6 +107,7 @@ OpenSeams::OpenSeams(const SheetDefinition& sheet, const std::vector<bool>& stre
     particles_.push_back(particle);
   }
   for (const auto& [from, to] : edges) edges_.push_back({numbers[from], numbers[to]});
+  parts_.assign(edges_.size(), -1);
   clear_.assign(edges_.size(), 0);
   x_ = d_ = before_ = Matrix3Xd::Zero(3, static_cast<Eigen::Index>(particles_.size()));
 }
@@ -111,10 +124,13 @@ void OpenSeams::keep_out(const Contacts& contacts, double dt, MovingSheet& sheet
   std::map<int, Move> moves;
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     const auto& ends = edges_[e];
+    const int parts = parts_of(x_.col(ends[0]), x_.col(ends[1]));
     clear_[e] -= std::max(come[ends[0]], come[ends[1]]) + contacts.reach();
-    if (clear_[e] > 0) continue;
-    const auto [nearest, normal, share] = depth_between(contacts, x_.col(ends[0]), x_.col(ends[1]));
-    clear_[e] = std::isfinite(nearest) ? nearest / 2 - kSpacing : 0;
+    if (parts == parts_[e] && clear_[e] > 0) continue;
+    const auto [nearest, clear, normal, share] =
+        depth_between(contacts, x_.col(ends[0]), x_.col(ends[1]), parts);
+    parts_[e] = parts;
+    clear_[e] = clear;
     if (!(nearest < 0) || normal.isZero(0)) continue;
     std::array<double, 2> part{1 - share, share};
     for (std::size_t k = 0; k < 2; ++k)

@@ -30,7 +30,7 @@ class OpenSeams {
   // until then, m
   std::vector<int> parts_;
   std::vector<double> clear_;
-  Matrix3Xd x_, d_, before_;               // of particles: now, in the step, when last read, m
+  Matrix3Xd x_, d_, before_;  // of particles: now, in the step, when last read, m
 };
 
 }  // namespace weft

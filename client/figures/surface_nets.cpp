@@ -18,8 +18,6 @@ class NetLattice {
       size_[axis] = static_cast<int>(std::ceil((high[k] - low[k]) / cell)) + 1;
     }
     values_.resize(static_cast<std::size_t>(size_[0] * size_[1] * size_[2]));
-    for (std::size_t axis = 0; axis < 3; ++axis) blocks_[axis] = (size_[axis] - 1) / kBlock + 1;
-    side_.resize(static_cast<std::size_t>(blocks_[0] * blocks_[1] * blocks_[2]));
     for (int z = 0; z < size_[2]; z += kBlock)
       for (int y = 0; y < size_[1]; y += kBlock)
         for (int x = 0; x < size_[0]; x += kBlock) set_block(function, {x, y, z});
@@ -55,39 +53,29 @@ class NetLattice {
     const double middle =
         function(place(Vector3d(first[0], first[1], first[2]) + Vector3d::Constant(kHalf)));
     const bool far = std::abs(middle) > least;
-    side(first) = !far ? 0 : middle < 0 ? -1 : 1;
     for (int z = first[2]; z < std::min(first[2] + kBlock, size_[2]); ++z)
       for (int y = first[1]; y < std::min(first[1] + kBlock, size_[1]); ++y)
         for (int x = first[0]; x < std::min(first[0] + kBlock, size_[0]); ++x)
           values_[index({x, y, z})] = far ? middle : function(place(Vector3d(x, y, z)));
   }
 
-  // Of the block of a corner.
-  signed char& side(const NetCorner& at) {
-    const int block = (at[2] / kBlock * blocks_[1] + at[1] / kBlock) * blocks_[0] + at[0] / kBlock;
-    return side_[static_cast<std::size_t>(block)];
-  }
-
-  // Those that the surface may cross.
+  // Those that the surface crosses.
   template <class F>
   void for_each_cell(const F& visit) {
     for (int z = 0; z + 1 < size_[2]; ++z)
-      for (int y = 0; y + 1 < size_[1]; ++y)
-        for (int x = 0; x + 1 < size_[0]; ++x) {
-          // where all corners are in blocks on one side, as for the cells up to the next block
-          if (x % kBlock == 0 || x % kBlock == kBlock - 1) {
-            const int last = std::min(x + 1, size_[0] - 1), own = side({x, y, z});
-            bool alike = own != 0;
-            for (const int at : {x, last})
-              for (const int beside : {y, y + 1})
-                for (const int above : {z, z + 1}) alike &= side({at, beside, above}) == own;
-            if (alike) {
-              if (x % kBlock == 0) x += kBlock - 2;
-              continue;
-            }
-          }
-          visit(NetCorner{x, y, z});
+      for (int y = 0; y + 1 < size_[1]; ++y) {
+        const double* const values = &values_[index({0, y, z})];
+        const int row = size_[0], layer = size_[0] * size_[1];
+        const auto inside_at = [&](int x) {  // of the four corners there
+          return (values[x] < 0 ? 1 : 0) + (values[x + row] < 0 ? 1 : 0) +
+                 (values[x + layer] < 0 ? 1 : 0) + (values[x + layer + row] < 0 ? 1 : 0);
+        };
+        for (int x = 0, before = inside_at(0); x + 1 < row; ++x) {
+          const int count = before + inside_at(x + 1);
+          if (count > 0 && count < 8) visit(NetCorner{x, y, z});
+          before = inside_at(x + 1);
         }
+      }
   }
 
   // Two sheets that meet in a face of a cell, inside at two corners opposite one another, would
@@ -103,7 +91,6 @@ class NetLattice {
           continue;
         const NetCorner& outside = first ? one : at;
         values_[index(outside)] = -0.01 * cell_;
-        side(outside) = 0;
         found = true;
       }
     });
@@ -150,10 +137,9 @@ class NetLattice {
 
   Vector3d low_;
   double cell_;
-  std::array<int, 3> size_{}, blocks_{};
+  std::array<int, 3> size_{};
   std::vector<double> values_;
-  std::vector<signed char> side_;  // of each block: -1 or 1 where it is far inside or outside
-  std::vector<int> vertex_;        // of each cell, by its first corner
+  std::vector<int> vertex_;  // of each cell, by its first corner
   FigureMesh mesh_;
 };
 

@@ -96,8 +96,8 @@ void Separation::add(bool edges, const Candidate& candidate, const std::array<do
   constexpr double kLeastReach = 0.02;      // of the thickness, where things nearly touch
   constexpr double kLeastMoves = 0.01;      // of its lightest particle's 1 / mass
   constexpr double kMostGivenIfHeld = 0.1;  // of the thickness
-  // of all of the one to all of the other, m^2
   const std::size_t ends = edges ? 2 : 1;
+  // of all of the one to all of the other, m^2
   const auto farthest = [&](Eigen::Vector4d Mover::*motion) {
     const auto by = [&](std::size_t n) -> const Eigen::Vector4d& {
       return around.movers[static_cast<std::size_t>(candidate.particle[n])].*motion;

@@ -14,7 +14,7 @@ namespace {
 constexpr double kSpacing = 0.01;  // of points that are looked at along an edge, at least, m
 constexpr double kOutward = 1;     // fastest that an edge is pushed out, m/s
 
-// Points that are looked at along an edge, and both ends, are so many parts from each other.
+// Of an edge, between its ends and the points that are looked at along it.
 int parts_of(const Vector3d& from, const Vector3d& to) {
   return static_cast<int>((to - from).norm() / kSpacing);
 }
@@ -30,7 +30,7 @@ struct Depth {
 
 Depth depth_between(const Contacts& contacts, const Vector3d& from, const Vector3d& to, int parts) {
   const double step = (to - from).norm() / parts;
-  // where distances may jump
+  // a deflated body's distances jump within the body as it is given
   const double sure = std::min(contacts.skin(), 0.0);
   Depth found;
   double sum = 0;

@@ -26,11 +26,9 @@ class OpenSeams {
  private:
   std::vector<int> particles_;             // ends of edges, ascending
   std::vector<std::array<int, 2>> edges_;  // numbers among particles_
-  // of each edge, when it was looked at: points on it part it in so many; so far its ends may come
-  // until then, m
-  std::vector<int> parts_;
-  std::vector<double> clear_;
-  Matrix3Xd x_, d_, before_;  // of particles: now, in the step, when last read, m
+  std::vector<int> parts_;                 // of each edge when it was looked at, between points
+  std::vector<double> clear_;              // of each edge: so far its ends may come unlooked at, m
+  Matrix3Xd x_, d_, before_;               // of particles: now, in the step, when last read, m
 };
 
 }  // namespace weft

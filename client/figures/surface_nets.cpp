@@ -71,9 +71,12 @@ class NetLattice {
                  (values[x + layer] < 0 ? 1 : 0) + (values[x + layer + row] < 0 ? 1 : 0);
         };
         for (int x = 0, before = inside_at(0); x + 1 < row; ++x) {
-          const int count = before + inside_at(x + 1);
-          if (count > 0 && count < 8) visit(NetCorner{x, y, z});
-          before = inside_at(x + 1);
+          int after = inside_at(x + 1);
+          if (before + after > 0 && before + after < 8) {
+            visit(NetCorner{x, y, z});
+            after = inside_at(x + 1);  // it may fill gaps
+          }
+          before = after;
         }
       }
   }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -66,7 +67,9 @@ class GridMaker {
   DistanceGrid make() {
     const auto [columns, rows, layers] = grid_.blocks;
     winding_.emplace(mesh_, grid_.low, grid_.cell, rows * kCells + 1, layers * kCells + 1);
-    measure_gaps();
+    distances_.resize(static_cast<std::size_t>(columns * rows * layers));
+    const auto most = static_cast<unsigned>(std::max({columns, rows, layers}));
+    measure({0, 0, 0}, static_cast<int>(std::bit_ceil(most)));
     for (int z = 0; z < layers; ++z)
       for (int y = 0; y < rows; ++y)
         for (int x = 0; x < columns; ++x) add_block({x, y, z});
@@ -81,69 +84,45 @@ class GridMaker {
 
  private:
   using Corner = std::array<int, 3>;  // in cells from grid_.low
-  static constexpr int kNoGap = 1 << 24;
 
-  // From each block to the nearest that may have some of the surface in it, squared, in blocks.
-  void measure_gaps() {
-    gaps_.assign(static_cast<std::size_t>(grid_.blocks[0] * grid_.blocks[1] * grid_.blocks[2]),
-                 kNoGap);
-    for (const auto& [i, j, k] : mesh_.triangles) mark(vertex(i), vertex(j), vertex(k));
-    std::vector<int> line;
-    for (std::size_t axis = 0, stride = 1; axis < 3; ++axis) {
-      const auto count = static_cast<std::size_t>(grid_.blocks[axis]);
-      for (std::size_t first = 0; first < gaps_.size(); ++first) {
-        if (first / stride % count != 0) continue;
-        line.clear();
-        for (std::size_t n = 0; n < count; ++n) line.push_back(gaps_[first + n * stride]);
-        for (std::size_t n = 0; n < count; ++n) gaps_[first + n * stride] = least_gap(line, n);
-      }
-      stride *= count;
+  // From the middles of blocks to the surface, m, of `size` blocks along each axis from the first:
+  // exactly, or at least where all are far.
+  void measure(const Corner& first, int size) {
+    constexpr double kFar = 3;  // times as far as they reach
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (first[axis] >= grid_.blocks[axis]) return;
+    const Vector3d middle = middle_of(first, size);
+    const double radius = std::sqrt(0.75) * size * kCells * grid_.cell;
+    nearest_ = tree_.nearest(middle, nearest_.triangle);
+    const double distance = std::sqrt(nearest_.squared);
+    if (size == 1) {
+      distances_[index(first)] = distance;
+      return;
     }
-  }
-
-  // Of those on a line through a block, each with its own gap beside the line.
-  static int least_gap(const std::vector<int>& line, std::size_t at) {
-    int least = kNoGap;
-    for (std::size_t n = 0; n < line.size(); ++n) {
-      const int between = std::max(std::abs(static_cast<int>(n) - static_cast<int>(at)) - 1, 0);
-      least = std::min(least, line[n] + between * between);
+    if (distance < kFar * radius || distance - radius < std::max(grid_.reach, grid_.cell)) {
+      for (int i = 0; i < 8; ++i)
+        measure({first[0] + (i & 1) * size / 2, first[1] + (i >> 1 & 1) * size / 2,
+                 first[2] + (i >> 2) * size / 2},
+                size / 2);
+      return;
     }
-    return least;
-  }
-
-  // Blocks that a triangle may have a part in.
-  void mark(const Vector3d& a, const Vector3d& b, const Vector3d& c) {
-    const double size = kCells * grid_.cell, half_diagonal = std::sqrt(0.75) * size;
-    const auto block_of = [&](const Vector3d& point, double beyond) -> Eigen::Array3i {
-      return ((point - grid_.low).array() / size + beyond).floor().cast<int>();
+    const auto last = [&](std::size_t axis) {
+      return std::min(first[axis] + size, grid_.blocks[axis]);
     };
-    constexpr double kRounding = 1e-9;  // of a block
-    const Eigen::Array3i first = block_of(a.cwiseMin(b).cwiseMin(c), -kRounding),
-                         last = block_of(a.cwiseMax(b).cwiseMax(c), kRounding);
-    const Vector3d normal = (b - a).cross(c - a).stableNormalized();
-    for (int z = first.z(); z <= last.z(); ++z)
-      for (int y = first.y(); y <= last.y(); ++y)
-        for (int x = first.x(); x <= last.x(); ++x)
-          if (std::abs((place({x, y, z}, kCells / 2.0) - a).dot(normal)) <=
-              half_diagonal * (1 + kRounding))
-            gaps_[index({x, y, z})] = 0;
+    for (int z = first[2]; z < last(2); ++z)
+      for (int y = first[1]; y < last(1); ++y)
+        for (int x = first[0]; x < last(0); ++x)
+          distances_[index({x, y, z})] = distance - (middle_of({x, y, z}, 1) - middle).norm();
   }
 
   void add_block(const Corner& block) {
-    constexpr double kLooked = 3;  // blocks: farther away a gap is near enough to the distance
     const double cell = grid_.cell, half_diagonal = std::sqrt(0.75) * kCells * cell;
-    const double gap = std::sqrt(gaps_[index(block)]);  // blocks
+    const double distance = distances_[index(block)];
+    const double clear = distance - half_diagonal;  // of every corner, at least
     const bool inside = winding_number(corner(block, {0, 0, 0})) > 0;
-    double distance = 0, clear = gap * kCells * cell;  // of every corner, at least
-    const Vector3d middle = place(block, kCells / 2.0);
-    if (gap < kLooked || clear < grid_.reach) {
-      nearest_ = tree_.nearest(middle, nearest_.triangle);
-      distance = std::sqrt(nearest_.squared);
-      clear = distance - half_diagonal;
-    }
     if (!inside && clear >= grid_.reach) return add_far(clear);
     const bool deep = inside && clear >= cell;
-    if (!deep) around_.set(middle, half_diagonal, distance);
+    if (!deep) around_.set(middle_of(block, 1), half_diagonal, distance);
     const auto begin = static_cast<std::int32_t>(grid_.values.size());
     grid_.begin.push_back(deep ? ~begin : begin);
     const int step = deep ? kCells : 1;
@@ -208,7 +187,6 @@ class GridMaker {
     return static_cast<std::size_t>((block[2] * grid_.blocks[1] + block[1]) * grid_.blocks[0] +
                                     block[0]);
   }
-  const Vector3d& vertex(int i) const { return mesh_.vertices[static_cast<std::size_t>(i)]; }
   Corner corner(const Corner& block, const Corner& in_block) const {
     return {block[0] * kCells + in_block[0], block[1] * kCells + in_block[1],
             block[2] * kCells + in_block[2]};
@@ -217,6 +195,9 @@ class GridMaker {
   Vector3d place(const Corner& block, double in_block, int cells = kCells) const {
     return grid_.low + grid_.cell * (Vector3d(block[0], block[1], block[2]) * cells +
                                      Vector3d::Constant(in_block));
+  }
+  Vector3d middle_of(const Corner& block, int size) const {
+    return place(block, size * kCells / 2.0);
   }
   int winding_number(const Corner& at) const {
     return winding_->at(grid_.low.x() + at[0] * grid_.cell, at[1], at[2]);
@@ -227,7 +208,7 @@ class GridMaker {
   TriangleTree::Around around_;  // the block that is being added
   std::optional<WindingNumbers> winding_;
   DistanceGrid grid_;
-  std::vector<int> gaps_;                // see measure_gaps()
+  std::vector<double> distances_;        // see measure()
   TriangleTree::Nearest nearest_{0, 0};  // of the point before
   std::map<int, std::int32_t> far_;      // values of blocks outside, by cells beyond the reach
   std::map<Corner, float> deep_;         // values at corners of blocks deep inside

@@ -67,13 +67,11 @@ class TriangleTree::Around {
   Nearest nearest(const Vector3d& point, int guess);
 
  private:
-  using Values = Eigen::ArrayXf;  // of each disc, m
-
   const TriangleTree& tree_;
   Vector3d middle_ = Vector3d::Zero();
   std::vector<int> triangles_;
   Eigen::Matrix<float, Eigen::Dynamic, 7> discs_;  // from middle_: middles; normals; radii
-  Values above_, squared_, least_;
+  Eigen::ArrayXf above_, squared_, least_;         // of each, m^2
 };
 
 }  // namespace weft

@@ -41,6 +41,11 @@ class LatticeSolver : public SheetSolver {
     }
     law_.damping = static_cast<T>(damping_ / (2 * dt));
     law_.wind.to_velocity = static_cast<T>(1 / (6 * dt));
+    if (dynamics_.drag.size() > 0) {
+      drag_rate_ = drag_rate();
+      law_.drag = static_cast<T>(drag_rate_ * dt);
+      law_.drag_share = T(1) / (T(1) + law_.drag / 2);
+    }
     // half a kick: x(-dt) = x - v dt + a dt^2 / 2
     Matrix3Xd a;
     accelerate(dynamics_, time, x, v, a);
@@ -60,11 +65,7 @@ class LatticeSolver : public SheetSolver {
 
   void advance(double time, ThreadPool& pool) override {
     Vector3d drift = dynamics_.gravity * (dt_ * dt_);
-    if (dynamics_.drag.size() > 0) {
-      const double rate = drag_rate();
-      law_.drag = static_cast<T>(rate * dt_);
-      drift += rate * dt_ * dt_ * dynamics_.air(time);
-    }
+    if (dynamics_.drag.size() > 0) drift += drag_rate_ * dt_ * dt_ * dynamics_.air(time);
     const Vector3d air = law_.wind.blows ? dynamics_.air(time) : Vector3d(Vector3d::Zero());
     for (std::size_t axis = 0; axis < 3; ++axis) {
       law_.drift[axis] = static_cast<T>(drift[static_cast<Eigen::Index>(axis)]);
@@ -312,6 +313,7 @@ class LatticeSolver : public SheetSolver {
   const Dynamics& dynamics_;
   int columns_, particles_;
   double damping_, dt_ = 0;
+  double drag_rate_ = 0;  // 1/s
   SweepLaw<T> law_;
   State state_;
   LatticeTethers<T> tethers_;

@@ -514,11 +514,11 @@ class Sweep {
                            HWY_ATTR { return p.local + (plane - State::kShared + kAxis) * kLanes; };
     const V old = hn::Load(d, local(State::kD)), at = hn::Load(d, shared(State::kX));
     const V drift = hn::Set(d, law_.drift[kAxis]);
-    V change = hn::MulAdd(force, step2, hn::IfThenElseZero(hn::Gt(step2, hn::Zero(d)), drift));
+    const auto moves = hn::Gt(step2, hn::Zero(d));
+    V change = hn::MulAdd(force, step2, hn::IfThenElseZero(moves, drift));
     if (law_.drag > 0) {
-      change = hn::Mul(hn::NegMulAdd(hn::Set(d, law_.drag), old, change),
-                       hn::Set(d, T(1) / (T(1) + law_.drag / 2)));
-      change = hn::IfThenElseZero(hn::Gt(step2, hn::Zero(d)), change);
+      const V slowed = hn::NegMulAdd(hn::Set(d, law_.drag), old, change);
+      change = hn::IfThenElseZero(moves, hn::Mul(slowed, hn::Set(d, law_.drag_share)));
     }
 
     V next = hn::Zero(d), there = hn::Zero(d);

@@ -74,7 +74,7 @@ struct SweepLaw {
   T isometric_weft = 0, isometric_twist = 0;
   T damping = 0;                                     // k_d / (2 dt), kg/s^2
   bool damp_far = false, damp_far_diagonal = false;  // bend connections damp too
-  T drag = 0;                                        // c dt / m
+  T drag = 0, drag_share = 1;                        // c dt / m, 1 / (1 + drag / 2)
   WindLaw<T> wind;
   std::array<T, 3> drift{};  // (gravity + c / m air) dt^2, m
   bool compensated = true;   // the sums of d and x

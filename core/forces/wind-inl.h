@@ -23,9 +23,11 @@ HWY_INLINE Triple<V> blow(D d, const WindLaw<hn::TFromD<D>>& wind, const Triple<
                       hn::Set(d, wind.velocity[2])};
   const Triple<V> relative = minus_times(air, three_w, hn::Set(d, wind.to_velocity));
   const V along = hn::Mul(dot(relative, cross), inverse);
+  const V speed = hn::Abs(along), pressure = hn::Set(d, wind.pressure);
+  if (!(wind.drag > 0)) return times(cross, hn::Mul(along, hn::Mul(speed, pressure)));
+
   const V drag = hn::Set(d, wind.drag);
-  const V push = hn::Mul(
-      along, hn::NegMulAdd(hn::Abs(along), hn::Neg(hn::Set(d, wind.pressure)), hn::Neg(drag)));
+  const V push = hn::Mul(along, hn::MulSub(speed, pressure, drag));
   return plus_times(times(cross, push), relative, hn::Mul(hn::Mul(square, inverse), drag));
 }
 

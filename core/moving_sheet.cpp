@@ -5,6 +5,7 @@
 
 #include "core/forces/air.h"
 #include "core/forces/elastic.h"
+#include "core/forces/springs.h"
 
 namespace weft {
 
@@ -84,10 +85,14 @@ void MovingSheet::set_pins(const SheetDefinition& definition) {
 }
 
 void MovingSheet::bind_forces(const Scene& scene) {
-  dynamics.force = [&scene, this](double time, const Matrix3Xd& x, const Matrix3Xd& v,
-                                  Matrix3Xd& force) {
+  dynamics.force = [this](double /*time*/, const Matrix3Xd& x, const Matrix3Xd& v,
+                          Matrix3Xd& force) {
     force.setZero(3, x.cols());
-    add_elastic_forces(mesh, x, v, force);
+    add_fast_forces(mesh, x, v, force);
+  };
+  dynamics.slow_force = [&scene, this](double time, const Matrix3Xd& x, const Matrix3Xd& v,
+                                       Matrix3Xd& force) {
+    if (!mesh.stencils.empty()) add_isometric_forces(mesh, x, force);
     if (scene.environment.wind) add_wind_forces(*scene.environment.wind, mesh, time, x, v, force);
   };
   dynamics.air = [&scene](double time) {

@@ -31,17 +31,21 @@ double area_by_mass(const SheetDefinition& sheet, const Mesh& mesh) {
   return sheet.spacing() * sheet.spacing() / mesh.mass.minCoeff();
 }
 
+// Rate at which wind damps a sheet that is nearly at rest, 1/s.
+double wind_rate(const Scene& scene, double area_by_mass) {
+  if (!scene.environment.wind) return 0;
+  const Wind& wind = *scene.environment.wind;
+  const double speed = wind.velocity.norm() * (1 + wind.gust);
+  return (wind.air_density * speed + wind.tangential_drag) * area_by_mass;
+}
+
 // Rate at which air damps a sheet that is nearly at rest, an upper estimate, 1/s. Verlet takes drag
 // centred, which no step is too long for.
 double air_rate(const Scene& scene, const SheetDefinition& sheet, const Mesh& mesh) {
   double rate = 0;
   if (!is_verlet(scene.solver.integrator) && mesh.drag.size() > 0)
     rate += mesh.drag.cwiseQuotient(mesh.mass).maxCoeff();
-  if (scene.environment.wind) {
-    const Wind& wind = *scene.environment.wind;
-    const double speed = wind.velocity.norm() * (1 + wind.gust);
-    rate += (wind.air_density * speed + wind.tangential_drag) * area_by_mass(sheet, mesh);
-  }
+  rate += wind_rate(scene, area_by_mass(sheet, mesh));
   return rate;
 }
 
@@ -106,6 +110,44 @@ StepPlan plan_step(const Scene& scene, const std::vector<StableStep>& sheets, do
   return step;
 }
 
+// Of the isometric law, at most: omega^2, 1/s^2.
+double bending_stiffness(const PlannedSheet& sheet) {
+  VectorXd rows = VectorXd::Zero(sheet.inverse_mass.size());
+  for (const Stencil& stencil : sheet.mesh.stencils) {
+    double weights = 0;
+    for (const double weight : stencil.weight) weights += std::abs(weight);
+    for (std::size_t k = 0; k < 4; ++k)
+      rows[stencil.particle[k]] += std::abs(stencil.weight[k]) * weights * stencil.stiffness;
+  }
+  return rows.cwiseProduct(sheet.inverse_mass).maxCoeff();
+}
+
+// Substeps in one of which slow forces may act: as many as the scene bears, where they then are a
+// small part of what bounds the step, and where impulses in time with the stiffest modes feed these
+// by less than the damping that every sheet has takes away.
+int slow_every(const Scene& scene, const std::vector<PlannedSheet>& planned, const StepPlan& step) {
+  constexpr double kMostOfBound = 0.25;  // of 4
+  constexpr double kMostStiffness = 2e-3;
+  std::int64_t every = std::min<std::int64_t>(scene.solver.slow_forces_every, step.substeps);
+  if (every == 1 || !is_verlet(scene.solver.integrator)) return 1;
+  const double dt = step.substep;
+  for (std::size_t s = 0; s < planned.size(); ++s) {
+    const Mesh& mesh = planned[s].mesh;
+    const double stiffness = dt * dt * bending_stiffness(planned[s]);
+    if (stiffness > kMostStiffness) return 1;
+    const SheetDefinition& sheet = scene.sheets[s];
+    // particles on the border of a grid have as much less area as mass
+    double rate = wind_rate(scene, std::holds_alternative<Grid>(sheet.shape)
+                                       ? sheet.spacing() * sheet.spacing() / mesh.mass.maxCoeff()
+                                       : area_by_mass(sheet, mesh));
+    if (mesh.drag.size() > 0) rate += mesh.drag.cwiseQuotient(mesh.mass).maxCoeff();
+    const double share = 4 * dt * rate + stiffness;
+    if (share > 0)
+      every = std::min(every, static_cast<std::int64_t>(std::min(1e9, kMostOfBound / share)));
+  }
+  return static_cast<int>(std::max<std::int64_t>(every, 1));
+}
+
 void describe_solver(const Scene& scene, const SheetDefinition& sheet, Plan& plan) {
   const std::string_view reason = needs_plain_solver(scene, sheet);
   if (!reason.empty()) {
@@ -115,6 +157,11 @@ void describe_solver(const Scene& scene, const SheetDefinition& sheet, Plan& pla
   const bool single = scene.solver.precision == Precision::kSingle;
   plan.passes.push_back(
       join(sheet.name, ": vector kernels in ", single ? "single" : "double", " precision"));
+}
+
+// Of slow forces.
+std::string how_often(const Plan& plan) {
+  return plan.step.slow_every == 1 ? "" : join(", every ", plan.step.slow_every, " substeps");
 }
 
 void describe_connections(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan) {
@@ -141,7 +188,7 @@ void describe_connections(const SheetDefinition& sheet, const Mesh& mesh, Plan& 
              law->diagonal_bend ? no_bend : "diagonal_bend is off");
   } else if (!mesh.stencils.empty()) {
     plan.passes.push_back(
-        join(sheet.name, ": isometric bend, ", mesh.stencils.size(), " stencils"));
+        join(sheet.name, ": isometric bend, ", mesh.stencils.size(), " stencils", how_often(plan)));
   } else {
     plan.skipped.push_back({join(sheet.name, ": isometric bend"), "the bending rigidity is 0"});
   }
@@ -168,7 +215,7 @@ void describe_forces(const SheetDefinition& sheet, const Mesh& mesh, Plan& plan)
   else
     plan.skipped.push_back({join(sheet.name, ": damping"), "k_d is 0"});
   if (mesh.drag.size() > 0)
-    plan.passes.push_back(join(sheet.name, ": drag"));
+    plan.passes.push_back(join(sheet.name, ": drag", how_often(plan)));
   else
     plan.skipped.push_back({join(sheet.name, ": drag"), "the textile has no air drag"});
 }
@@ -494,6 +541,13 @@ std::span<const std::string_view> warning_codes() {
   return kCodes;
 }
 
+int StepPlan::slow_in(std::int64_t k) const {
+  const std::int64_t groups = (substeps + slow_every - 1) / slow_every;
+  const auto begin = [&](std::int64_t group) { return (group * substeps + groups - 1) / groups; };
+  const std::int64_t group = k * groups / substeps;
+  return k == begin(group) ? static_cast<int>(begin(group + 1) - k) : 0;
+}
+
 std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver,
                                         std::int64_t most_substeps) {
   const bool unstable = step.substep > step.longest() && !solver.allow_unstable;
@@ -505,6 +559,7 @@ Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
   Plan plan;
   const std::vector<StableStep> steps = stable_steps(scene, sheets);
   plan.step = plan_step(scene, steps, gain_of(scene, sheets, steps));
+  plan.step.slow_every = slow_every(scene, sheets, plan.step);
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     plan.dampings.push_back(
         {scene.sheets[s].name, sheets[s].mesh.damping, steps[s].connection_ratio});
@@ -514,13 +569,14 @@ Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
     describe_tethers(scene, s, sheets[s], plan);
     plan.particle_substeps += scene.sheets[s].particle_count() / plan.step.substep;
   }
-  const auto pass = [&](const char* name, bool runs, const char* why_not) {
+  const auto pass = [&](const std::string& name, bool runs, const char* why_not) {
     if (runs)
       plan.passes.emplace_back(name);
     else
       plan.skipped.push_back({name, why_not});
   };
-  pass("wind", scene.environment.wind.has_value(), "the scene has none");
+  const bool windy = scene.environment.wind.has_value();
+  pass(windy ? "wind" + how_often(plan) : "wind", windy, "the scene has none");
   pass("contact", !scene.colliders.empty(), "the scene has no collider");
   describe_poses(scene, plan);
   describe_cloth_contact(scene, plan);

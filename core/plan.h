@@ -22,6 +22,11 @@ struct StepPlan {
   double damping_ratio = 0;    // of the stiffest mode
   std::string limiting_sheet;
   double unsheared_bound = 0;  // for shapes that shear little; 0: not asked for
+  int slow_every = 1;          // substeps in one of which slow forces act, at most
+
+  // How many times as strongly slow forces act in substep k of a frame: they stand for it and those
+  // after it up to the next one in which they do, as many each time, or one less.
+  int slow_in(std::int64_t k) const;
 
   // The longest that is not refused, s.
   double longest() const { return std::max(linear_bound, unsheared_bound); }

@@ -67,7 +67,8 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   if (cloth_contact && unfinished->substeps == 0)
     cloth_contact->begin_frame(sheets, repairs.tangled(), untangling_speed(scene, begin), pool);
   for (std::int64_t& k = unfinished->substeps; k < plan.step.substeps;) {
-    step(begin + static_cast<double>(k) * dt, dt, k + 1 == plan.step.substeps, pool);
+    step(begin + static_cast<double>(k) * dt, dt, plan.step.slow_in(k), k + 1 == plan.step.substeps,
+         pool);
     ++k;
     if (settles && k % settling == 0) settle(begin + static_cast<double>(k) * dt);
     if (enough && k % turn == 0 && k < plan.step.substeps && enough()) return false;
@@ -75,14 +76,14 @@ bool Simulation::State::take_substeps(const Enough& enough, ThreadPool& pool) {
   return true;
 }
 
-// One substep, from `time` to `time` + dt.
-void Simulation::State::step(double time, double dt, bool ends_frame, ThreadPool& pool) {
+// One substep, from `time` to `time` + dt; slow forces act so many times as strongly.
+void Simulation::State::step(double time, double dt, int slow, bool ends_frame, ThreadPool& pool) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     MovingSheet& sheet = sheets[s];
     const SheetDefinition& definition = scene.sheets[s];
 
     // forces and motion
-    sheet.solver->advance(time, pool);
+    sheet.solver->advance(time, slow, pool);
     move_pins(definition.pins, time + dt, dt, sheet);
     if (!sheet.dynamics.tethers.empty()) sheet.solver->pull_back(pool);
   }
@@ -177,9 +178,16 @@ Decision Simulation::State::repair(const Attempt& made, NextStates& next) {
 
 // Solvers begin at the end of the last frame with the step as it now is.
 void Simulation::State::begin_again() {
-  for (MovingSheet& sheet : sheets)
-    sheet.solver->start(sheet.good().x, sheet.good().v, time(), plan.step.substep);
+  for (std::size_t s = 0; s < sheets.size(); ++s)
+    start(s, sheets[s].good().x, sheets[s].good().v, time());
   forget_motion();
+}
+
+// Begins a sheet with the step as it now is.
+void Simulation::State::start(std::size_t sheet, const Matrix3Xd& x, const Matrix3Xd& v,
+                              double time) {
+  sheets[sheet].dynamics.slow_every = plan.step.slow_in(0);
+  sheets[sheet].solver->start(x, v, time, plan.step.substep);
 }
 
 // Solvers go on from the end of the frame with the step as it now is.
@@ -188,7 +196,7 @@ void Simulation::State::restart_from(NextStates& next) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     Matrix3Xd v;
     sheets[s].solver->closing_velocities(end, v);
-    sheets[s].solver->start(next[s].x, v, end, plan.step.substep);
+    start(s, next[s].x, v, end);
     sheets[s].read(next[s]);
   }
   forget_motion();
@@ -283,7 +291,7 @@ Simulation::State::State(Scene given, SolverFactory factory)
     Matrix3Xd v = start_velocities(definition);
     set_pin_velocities(definition.pins, 0, dt, v);
     sheets[s].solver = make_solver(scene, definition, sheets[s].mesh, sheets[s].dynamics);
-    sheets[s].solver->start(x[s], v, 0, dt);
+    start(s, x[s], v, 0);
     sheets[s].most_strain = std::max(kMostStrain, 2 * largest_strain(sheets[s].mesh, x[s]));
   }
   make_cloth_contact();

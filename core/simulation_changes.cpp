@@ -40,7 +40,7 @@ void Simulation::State::restart(const SheetStates& states, double old_dt,
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     sheets[s].budget = {};
     if (!changed[s] && dt == old_dt) continue;
-    sheets[s].solver->start(states.x[s], states.v[s], time(), dt);
+    start(s, states.x[s], states.v[s], time());
     sheets[s].read_good();
   }
   forget_motion();

@@ -118,7 +118,7 @@ void Simulation::State::stand_still(double time, NextStates& next) {
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     next[s].v = Matrix3Xd::Zero(3, next[s].x.cols());
     next[s].kinetic_energy = 0;
-    sheets[s].solver->start(next[s].x, next[s].v, time, plan.step.substep);
+    start(s, next[s].x, next[s].v, time);
   }
   forget_motion();
 }

@@ -83,7 +83,7 @@ bool Simulation::State::adopt(const Snapshot& snapshot) {
     sheet.most_strain = saved.most_strain;
     sheet.ramp = saved.ramp;
     sheet.budget = saved.budget;
-    sheet.solver->start(saved.x, saved.v, time(), plan.step.substep);
+    start(s, saved.x, saved.v, time());
     if (!sheet.solver->load(saved.solver)) return false;
   }
   forget_motion();

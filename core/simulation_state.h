@@ -77,10 +77,11 @@ struct Simulation::State {
   FramePart advance_frame(const Enough& enough, ThreadPool& pool);
   bool begin_frame(bool in_parts);
   bool take_substeps(const Enough& enough, ThreadPool& pool);
-  void step(double time, double dt, bool ends_frame, ThreadPool& pool);
+  void step(double time, double dt, int slow, bool ends_frame, ThreadPool& pool);
   Attempt inspect_sheets(NextStates& next, ThreadPool& pool);
   Decision repair(const Attempt& made, NextStates& next);
   void begin_again();
+  void start(std::size_t sheet, const Matrix3Xd& x, const Matrix3Xd& v, double time);
   void restart_from(NextStates& next);
   void forget_motion();
   bool keep_to_budget(NextStates& next);

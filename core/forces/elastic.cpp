@@ -11,8 +11,12 @@ namespace weft {
 
 void add_elastic_forces(const Mesh& mesh, const Matrix3Xd& x, const Matrix3Xd& v,
                         Matrix3Xd& force) {
-  add_spring_forces(mesh, x, v, force);
+  add_fast_forces(mesh, x, v, force);
   if (!mesh.stencils.empty()) add_isometric_forces(mesh, x, force);
+}
+
+void add_fast_forces(const Mesh& mesh, const Matrix3Xd& x, const Matrix3Xd& v, Matrix3Xd& force) {
+  add_spring_forces(mesh, x, v, force);
   add_membrane_forces(mesh.surface, x, force);
   add_curvature_forces(mesh.surface, x, force);
   add_hinge_forces(mesh.surface.hinges, x, force);

@@ -29,7 +29,7 @@ class LatticeSolver : public SheetSolver {
         state_(law_.layout, compensated, static_cast<T>(lead_of(integrator))),
         gaps_(static_cast<std::size_t>(law_.layout.rows), 1) {
     law_.compensated = compensated;
-    if (wind) law_.wind = make_wind_law<T>(*wind);
+    if (wind) law_.wind = wind_ = make_wind_law<T>(*wind);
   }
 
   void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
@@ -41,11 +41,8 @@ class LatticeSolver : public SheetSolver {
     }
     law_.damping = static_cast<T>(damping_ / (2 * dt));
     law_.wind.to_velocity = static_cast<T>(1 / (6 * dt));
-    if (dynamics_.drag.size() > 0) {
-      drag_rate_ = drag_rate();
-      law_.drag = static_cast<T>(drag_rate_ * dt);
-      law_.drag_share = T(1) / (T(1) + law_.drag / 2);
-    }
+    drag_rate_ = dynamics_.drag.size() > 0 ? drag_rate() : 0;
+    set_slow(1);
     // half a kick: x(-dt) = x - v dt + a dt^2 / 2
     Matrix3Xd a;
     accelerate(dynamics_, time, x, v, a);
@@ -63,9 +60,10 @@ class LatticeSolver : public SheetSolver {
     pushed_ = 0;
   }
 
-  void advance(double time, ThreadPool& pool) override {
+  void advance(double time, int slow, ThreadPool& pool) override {
+    if (static_cast<T>(slow) != law_.slow) set_slow(slow);
     Vector3d drift = dynamics_.gravity * (dt_ * dt_);
-    if (dynamics_.drag.size() > 0) drift += drag_rate_ * dt_ * dt_ * dynamics_.air(time);
+    if (law_.drag > 0) drift += slow * drag_rate_ * dt_ * dt_ * dynamics_.air(time);
     const Vector3d air = law_.wind.blows ? dynamics_.air(time) : Vector3d(Vector3d::Zero());
     for (std::size_t axis = 0; axis < 3; ++axis) {
       law_.drift[axis] = static_cast<T>(drift[static_cast<Eigen::Index>(axis)]);
@@ -225,6 +223,15 @@ class LatticeSolver : public SheetSolver {
 
   int bands(const ThreadPool& pool) const { return std::min(pool.threads(), most_threads()); }
 
+  void set_slow(int slow) {
+    law_.slow = static_cast<T>(slow);
+    law_.wind.blows = wind_.blows && slow > 0;
+    law_.wind.pressure = law_.slow * wind_.pressure;
+    law_.wind.drag = law_.slow * wind_.drag;
+    law_.drag = static_cast<T>(slow * drag_rate_ * dt_);
+    law_.drag_share = T(1) / (T(1) + law_.drag / 2);
+  }
+
   using Place = typename State::Place;
   using ConstPlace = typename State::ConstPlace;
   template <class F>
@@ -315,6 +322,7 @@ class LatticeSolver : public SheetSolver {
   double damping_, dt_ = 0;
   double drag_rate_ = 0;  // 1/s
   SweepLaw<T> law_;
+  WindLaw<T> wind_;
   State state_;
   LatticeTethers<T> tethers_;
   bool held_moved_ = true;  // since the ends of tethers were read

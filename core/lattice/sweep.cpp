@@ -212,9 +212,10 @@ class Sweep {
     row.bend_along = !next ? &law_.none : edge ? &law_.along_warp_edge : &law_.along_warp;
     row.bend_down = here && after ? &law_.along_weft : &law_.none;
     row.bend_diagonal = here && after && law_.bend_diagonal ? &law_.diagonal : &law_.none;
-    if (next) row.isometric_along = edge ? law_.isometric_warp_edge : law_.isometric_warp;
-    if (here && after) row.isometric_down = law_.isometric_weft;
-    if (after) row.isometric_twist = law_.isometric_twist;
+    if (next)
+      row.isometric_along = law_.slow * (edge ? law_.isometric_warp_edge : law_.isometric_warp);
+    if (here && after) row.isometric_down = law_.slow * law_.isometric_weft;
+    if (after) row.isometric_twist = law_.slow * law_.isometric_twist;
     row.near_rows = static_cast<T>((r + 1 >= 0) + 1 + (r + 3 < rows));
     row.far_rows = static_cast<T>(here + 1 + (r + 4 < rows));
     return row;
@@ -565,7 +566,8 @@ T sweep_as(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band) {
 template <class T>
 T sweep_lattice(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band) {
   const bool shears = law.shear.stiffness > 0;
-  switch (law.bend) {
+  const bool idle = law.bend == BendKind::kIsometric && law.slow == 0;
+  switch (idle ? BendKind::kNone : law.bend) {
     case BendKind::kNone:
       return shears ? sweep_as<BendKind::kNone, true, false>(law, state, band)
                     : sweep_as<BendKind::kNone, false, false>(law, state, band);

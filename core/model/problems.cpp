@@ -343,6 +343,7 @@ void check_solver(const SolverSettings& solver, Check& check) {
   if (solver.substep) check.number("solver.substep_s", *solver.substep, 1e-9, 10, "s");
   check.number("solver.safety", solver.safety, 0.01, 1, "");
   check.number("solver.max_repairs", solver.max_repairs, 0, 20, "");
+  check.number("solver.slow_forces_every", solver.slow_forces_every, 1, 16, "substeps");
   if (solver.max_self_weight_strain)
     check.number("solver.max_self_weight_strain", *solver.max_self_weight_strain, 1e-4, 1, "");
 }

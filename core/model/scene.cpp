@@ -21,6 +21,7 @@ SolverSettings default_settings(Accuracy accuracy) {
     settings.max_self_weight_strain = 0.01;
     settings.step_bound = StepBound::kUnsheared;
     settings.integrator = IntegratorKind::kLaggedVerlet;
+    settings.slow_forces_every = 4;
   }
   if (accuracy == Accuracy::kFine) {
     settings.precision = Precision::kDouble;

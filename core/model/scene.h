@@ -170,6 +170,9 @@ struct SolverSettings {
   bool allow_unstable = false;
   double safety = 0.9;  // planned substep / linear bound
   StepBound step_bound = StepBound::kEveryShape;
+  // Wind, drag and the bending of a lattice's Isometric act in one of so many substeps or fewer, so
+  // many times as strongly; Verlet alone.
+  int slow_forces_every = 1;
   // Most halvings of the step by the guard; 0: only what is not finite stops a run.
   int max_repairs = 12;
   // Most that a sheet may stretch under its own weight: stiffer textiles are simulated as soft as
@@ -181,7 +184,7 @@ struct SolverSettings {
 // has the errors.
 enum class Accuracy {
   kDraft,  // sheets stretch by 1 % under their weight where their textile would less; long steps,
-           // lagged damping
+           // lagged damping, slow forces in every fourth step
   kStandard,  // errors are far below what the mesh makes
   kFine       // double precision and a quarter of the step
 };

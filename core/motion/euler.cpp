@@ -6,7 +6,8 @@ namespace {
 // Forward Euler, as Table II counts it: x' = x + v dt, v' = v + a(x, v) dt.
 class Euler : public VelocityIntegrator {
  public:
-  void advance(const Dynamics& dynamics, double time, double dt, Motion& motion) override {
+  void advance(const Dynamics& dynamics, double time, double dt, int /*slow*/,
+               Motion& motion) override {
     velocity(motion, dt, v_);
     accelerate(dynamics, time, motion.x, v_, a_);
     motion.d_previous = motion.d;

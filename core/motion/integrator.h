@@ -17,8 +17,13 @@ struct Motion {
 
 // What moves a sheet.
 struct Dynamics {
-  // Writes all forces but drag and weight, N, given time, positions and velocities.
+  // Writes all forces but slow ones, drag and weight, N, given time, positions and velocities.
   std::function<void(double, const Matrix3Xd&, const Matrix3Xd&, Matrix3Xd&)> force;
+  // Adds those that change slowly, N; none: there are none.
+  std::function<void(double, const Matrix3Xd&, const Matrix3Xd&, Matrix3Xd&)> slow_force;
+  // They and drag act in one of so many steps, so many times as strongly (r-RESPA, Tuckerman et al.
+  // 1992).
+  int slow_every = 1;
   VectorXd inverse_mass;  // 1/kg, 0: held; such a particle keeps its d
   VectorXd drag;          // kg/s, or empty
   Vector3d gravity;       // m/s^2
@@ -34,8 +39,10 @@ class Integrator {
   // Sets d and d_previous from x at `time` and velocities v.
   virtual void start(const Dynamics& dynamics, double time, double dt, const Matrix3Xd& v,
                      Motion& motion) = 0;
-  // Advances x, d and d_previous from `time` by dt.
-  virtual void advance(const Dynamics& dynamics, double time, double dt, Motion& motion) = 0;
+  // Advances x, d and d_previous from `time` by dt. slow: how many times as strongly slow forces
+  // and drag act, 1 but for Verlet.
+  virtual void advance(const Dynamics& dynamics, double time, double dt, int slow,
+                       Motion& motion) = 0;
   // Velocities at `time` as the forces there complete them, m/s: what start() needs to go on with
   // other forces or another dt without losing an order.
   virtual void closing_velocity(const Dynamics& dynamics, double time, double dt,
@@ -56,7 +63,10 @@ std::unique_ptr<Integrator> make_midpoint();
 std::unique_ptr<Integrator> make_rk4();
 std::unique_ptr<Integrator> make_integrator(IntegratorKind kind);
 
-// Acceleration with every force, m/s^2; 0 for held particles.
+// Writes forces but drag and weight, slow ones so many times as strong, N.
+void add_up(const Dynamics& dynamics, double time, int slow, const Matrix3Xd& x, const Matrix3Xd& v,
+            Matrix3Xd& force);
+// Acceleration with every force, as in a step in which slow ones act, m/s^2; 0 for held particles.
 void accelerate(const Dynamics& dynamics, double time, const Matrix3Xd& x, const Matrix3Xd& v,
                 Matrix3Xd& a);
 

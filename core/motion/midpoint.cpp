@@ -6,7 +6,8 @@ namespace {
 // Midpoint: the slopes half a step ahead carry over the whole step.
 class Midpoint : public VelocityIntegrator {
  public:
-  void advance(const Dynamics& dynamics, double time, double dt, Motion& motion) override {
+  void advance(const Dynamics& dynamics, double time, double dt, int /*slow*/,
+               Motion& motion) override {
     velocity(motion, dt, v_);
     accelerate(dynamics, time, motion.x, v_, a_);
     x_middle_ = motion.x + v_ * (dt / 2);

@@ -19,8 +19,8 @@ class PlainSolver : public SheetSolver {
     integrator_->start(dynamics_, time, dt, v, motion_);
   }
 
-  void advance(double time, ThreadPool& /*pool*/) override {
-    integrator_->advance(dynamics_, time, dt_, motion_);
+  void advance(double time, int slow, ThreadPool& /*pool*/) override {
+    integrator_->advance(dynamics_, time, dt_, slow, motion_);
   }
 
   void move_held(int particle, const Vector3d& x, const Vector3d& d) override {

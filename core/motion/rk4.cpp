@@ -7,7 +7,8 @@ namespace {
 // 1:2:2:1.
 class Rk4 : public VelocityIntegrator {
  public:
-  void advance(const Dynamics& dynamics, double time, double dt, Motion& motion) override {
+  void advance(const Dynamics& dynamics, double time, double dt, int /*slow*/,
+               Motion& motion) override {
     velocity(motion, dt, v_);
     accelerate(dynamics, time, motion.x, v_, a_);
     v_sum_ = v_;

@@ -19,8 +19,9 @@ class SheetSolver {
   // Begins, or begins again, from positions (m) and velocities (m/s) at `time`, with steps of dt
   // (s). (3 x particles)
   virtual void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) = 0;
-  // One step of all free particles from `time`; large sheets are shared among the pool.
-  virtual void advance(double time, ThreadPool& pool) = 0;
+  // One step of all free particles from `time`, in which slow forces and drag act so many times as
+  // strongly; large sheets are shared among the pool.
+  virtual void advance(double time, int slow, ThreadPool& pool) = 0;
   // Puts a held particle where its path leads it: position and displacement of the step, m.
   virtual void move_held(int particle, const Vector3d& x, const Vector3d& d) = 0;
   // Moves free particles back to where their tethers reach.

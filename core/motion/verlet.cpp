@@ -19,11 +19,12 @@ class Verlet : public Integrator {
     if (lead_ != 2) motion.d_previous = (lead_ * motion.d - v * (2 * dt)) / (lead_ - 2);
   }
 
-  void advance(const Dynamics& dynamics, double time, double dt, Motion& motion) override {
+  void advance(const Dynamics& dynamics, double time, double dt, int slow,
+               Motion& motion) override {
     velocity(motion, dt, v_);
-    dynamics.force(time, motion.x, v_, a_);
+    add_up(dynamics, time, slow, motion.x, v_, a_);
     motion.d_previous.swap(motion.d);
-    const bool drag = dynamics.drag.size() > 0;
+    const bool drag = slow > 0 && dynamics.drag.size() > 0;
     const Vector3d air = drag ? dynamics.air(time) : Vector3d(Vector3d::Zero());
     for (Eigen::Index i = 0; i < a_.cols(); ++i) {
       const double inverse_mass = dynamics.inverse_mass[i];
@@ -33,7 +34,7 @@ class Verlet : public Integrator {
       }
       Vector3d a = inverse_mass * a_.col(i) + dynamics.gravity;
       if (drag) {
-        const double rate = dynamics.drag[i] * inverse_mass;  // 1/s
+        const double rate = slow * dynamics.drag[i] * inverse_mass;  // 1/s
         a += rate * air;
         motion.d.col(i) =
             ((1 - rate * dt / 2) * motion.d_previous.col(i) + a * (dt * dt)) / (1 + rate * dt / 2);

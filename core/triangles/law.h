@@ -87,6 +87,7 @@ struct TriangleLaw {
   std::array<T, 4> drift{};  // gravity dt^2, m
   std::array<T, 4> air{};    // displacement of the air in dt, m
   WindLaw<T> wind;
+  T slow = 1;  // how many times as strongly drag acts in this substep; 0: neither it nor wind does
   bool compensated = true;  // the sums of d and x
   bool measured = false;    // whether sweep() says how far particles went
 };

@@ -30,7 +30,7 @@ class TriangleSolver : public SheetSolver {
         gaps_(static_cast<std::size_t>(law_.blocks()) * kRunsOfBlock, kRunsOfBlock) {
     law_.compensated = compensated;
     law_.drags = dynamics.drag.size() > 0;
-    if (wind) law_.wind = make_wind_law<T>(*wind);
+    if (wind) law_.wind = wind_ = make_wind_law<T>(*wind);
     state_.prepare(law_);
     if (!mesh.surface.hinges.empty()) find_hinged();
   }
@@ -43,6 +43,7 @@ class TriangleSolver : public SheetSolver {
       origin_ /= particles_;
     }
     set_step();
+    set_slow(1);
     // half a kick: x(-dt) = x - v dt + a dt^2 / 2
     Matrix3Xd a;
     accelerate(dynamics_, time, x, v, a);
@@ -56,9 +57,10 @@ class TriangleSolver : public SheetSolver {
     pushed_ = 0;
   }
 
-  void advance(double time, ThreadPool& pool) override {
-    const Vector3d air =
-        law_.drags || law_.wind.blows ? dynamics_.air(time) : Vector3d(Vector3d::Zero());
+  void advance(double time, int slow, ThreadPool& pool) override {
+    if (static_cast<T>(slow) != law_.slow) set_slow(slow);
+    const bool airy = slow > 0 && (law_.drags || law_.wind.blows);
+    const Vector3d air = airy ? dynamics_.air(time) : Vector3d(Vector3d::Zero());
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double speed = air[static_cast<Eigen::Index>(axis)];
       law_.drift[axis] =
@@ -219,6 +221,12 @@ class TriangleSolver : public SheetSolver {
     }
   }
 
+  void set_slow(int slow) {
+    law_.slow = static_cast<T>(slow);
+    law_.wind.pressure = law_.slow * wind_.pressure;
+    law_.wind.drag = law_.slow * wind_.drag;
+  }
+
   // Numbers the particles of hinges apart.
   void find_hinged() {
     state_.turn = AlignedArray<T>(state_.size());
@@ -322,6 +330,7 @@ class TriangleSolver : public SheetSolver {
   int particles_;
   double dt_ = 0;
   TriangleLaw<T> law_;
+  WindLaw<T> wind_;
   TriangleState<T> state_;
   bool started_ = false;
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m

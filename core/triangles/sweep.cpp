@@ -245,8 +245,9 @@ HWY_INLINE void move_block(D d, const TriangleLaw<T>& law, TriangleState<T>& sta
     const V at = hn::Load(d, state.x.data() + i);
     V change = hn::MulAdd(hn::Load(d, force + k), step2,
                           hn::IfThenElseZero(hn::Gt(step2, hn::Zero(d)), drift));
-    if (law.drags) {
-      const V rate = hn::Load(d, state.drag.data() + i), one = hn::Set(d, T(1));
+    if (law.drags && law.slow > 0) {
+      const V rate = hn::Mul(hn::Set(d, law.slow), hn::Load(d, state.drag.data() + i));
+      const V one = hn::Set(d, T(1));
       change = hn::Div(hn::MulAdd(rate, hn::Sub(air, old), change),
                        hn::MulAdd(rate, hn::Set(d, T(0.5)), one));
     }
@@ -333,7 +334,8 @@ void step(const TriangleLaw<T>& law, TriangleState<T>& state, std::size_t first,
                  decltype(blows)::value>(law, state, first, last, copy, farthest);
   };
   const auto damped = [&](auto pushes, auto bends, auto damps) {
-    law.wind.blows ? with(pushes, bends, damps, on) : with(pushes, bends, damps, off);
+    const bool blows = law.wind.blows && law.slow > 0;
+    blows ? with(pushes, bends, damps, on) : with(pushes, bends, damps, off);
   };
   const auto bent = [&](auto pushes, auto bends) {
     law.damping > 0 ? damped(pushes, bends, on) : damped(pushes, bends, off);

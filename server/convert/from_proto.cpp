@@ -494,6 +494,7 @@ SolverSettings Reader::solver(const v1::SolverSettings& from, bool dressed) {
   if (from.has_max_repairs()) solver.max_repairs = from.max_repairs();
   if (from.has_max_self_weight_strain())
     solver.max_self_weight_strain = from.max_self_weight_strain();
+  if (from.has_slow_forces_every()) solver.slow_forces_every = from.slow_forces_every();
   return solver;
 }
 

@@ -195,6 +195,7 @@ void set(v1::SolverSettings* to, const SolverSettings& from) {
   if (from.max_self_weight_strain) to->set_max_self_weight_strain(*from.max_self_weight_strain);
   to->set_step_bound(from.step_bound == StepBound::kUnsheared ? v1::STEP_BOUND_UNSHEARED
                                                               : v1::STEP_BOUND_EVERY_SHAPE);
+  to->set_slow_forces_every(from.slow_forces_every);
   to->set_precision(from.precision == Precision::kSingle ? v1::PRECISION_SINGLE
                                                          : v1::PRECISION_DOUBLE);
 }
@@ -351,6 +352,7 @@ v1::Plan to_proto(const Plan& plan) {
   result.set_damping_ratio(plan.step.damping_ratio);
   result.set_limiting_sheet(plan.step.limiting_sheet);
   result.set_unsheared_bound_s(plan.step.unsheared_bound);
+  result.set_slow_forces_every(plan.step.slow_every);
   for (const auto& pass : plan.passes) result.add_passes(pass);
   for (const auto& skipped : plan.skipped) {
     v1::SkippedPass* added = result.add_skipped();

@@ -23,7 +23,7 @@ void advance(benchmark::State& state, IntegratorKind kind) {
   const double dt = 1e-9;
   integrator->start(dynamics, 0, dt, Matrix3Xd::Zero(3, kParticles), motion);
   for (auto _ : state) {
-    integrator->advance(dynamics, 0, dt, motion);
+    integrator->advance(dynamics, 0, dt, 1, motion);
     benchmark::DoNotOptimize(motion.x.data());
   }
   state.SetItemsProcessed(state.iterations() * kParticles);

@@ -48,6 +48,7 @@ void expect_same(const Simulation& found, const Simulation& wanted) {
   EXPECT_EQ(a.plan.step.substep, b.plan.step.substep);
   EXPECT_EQ(a.plan.step.estimated_bound, b.plan.step.estimated_bound);
   EXPECT_EQ(a.plan.step.unsheared_bound, b.plan.step.unsheared_bound);
+  EXPECT_EQ(a.plan.step.slow_every, b.plan.step.slow_every);
   EXPECT_EQ(a.plan.passes, b.plan.passes);
   EXPECT_EQ(a.repairs.size(), b.repairs.size());
   EXPECT_EQ(found.stats().kinetic_energy, wanted.stats().kinetic_energy);
@@ -125,6 +126,12 @@ const Variant kVariants[] = {
      [](Scene& scene) {
        std::get<RawTextile>(scene.sheets[0].textile.model).stretch = 50;
        scene.sheets[0].tether_stretch = 0;
+     }},
+    {"SlowForces",
+     [](Scene& scene) {
+       scene.sheets[0].bending = Isometric{};
+       scene.environment.wind = Wind{.velocity = {1, 0, 1}};
+       scene.solver.slow_forces_every = 4;
      }},
     {"UnshearedStep",
      [](Scene& scene) {

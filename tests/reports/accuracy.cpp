@@ -73,6 +73,7 @@ class AccuracyPage {
     best();
     resolution();
     interpolation();
+    slow_forces();
     chaos();
     triangles();
     model();
@@ -585,6 +586,44 @@ class AccuracyPage {
       }
     }
     page_.table({"scene", "2", "3", "4", "6", "interpolation alone, 4"}, rows);
+  }
+
+  void slow_forces() {
+    progress("slow forces");
+    constexpr int kSize = 31, kRuns = 5;
+    page_.text("## Slow forces rarely");
+    page_.text(fmt::format(
+        "With `solver.slow_forces_every` n wind, drag and the bending of ISOMETRIC act in one of n "
+        "substeps, n times as strongly. {0} x {0} particles, STANDARD else: RMS distance in mm "
+        "after {1:.2g} s from the run in which they act in each, and in brackets the time over "
+        "what that run takes, the shortest of {2} each. DRAFT takes 4.",
+        kSize, kMostFrames / 60.0, kRuns));
+    std::vector<Cells> rows;
+    for (const char* name : {"hang", "flag"}) {
+      for (const auto& [law, bending] :
+           {std::pair<const char*, BendingLaw>("CHOI_KO", ChoiKo{}),
+            std::pair<const char*, BendingLaw>("ISOMETRIC", Isometric{})}) {
+        const Case given = make_case(name, kSize);
+        const std::array every = {1, 2, 4, 8, 16};
+        std::array<Outcome, every.size()> outcomes;
+        for (int k = 0; k < kRuns; ++k)
+          for (std::size_t i = 0; i < every.size(); ++i) {
+            Outcome now = run(given,
+                              {.name = "",
+                               .accuracy = Accuracy::kStandard,
+                               .slow_forces_every = every[i],
+                               .bending = bending},
+                              kMostFrames);
+            if (k == 0 || now.time < outcomes[i].time) outcomes[i] = std::move(now);
+          }
+        Cells row{fmt::format("{}, {}", name, law)};
+        for (std::size_t i = 1; i < every.size(); ++i)
+          row.push_back(fmt::format("{:.2g} ({:.2f})", 1e3 * rms(outcomes[i].x - outcomes[0].x),
+                                    outcomes[i].time / outcomes[0].time));
+        rows.push_back(std::move(row));
+      }
+    }
+    page_.table({"scene", "2", "4", "8", "16"}, rows);
   }
 
   // Positions of the paper's sheet, fallen on a ball, after a quarter of a second.

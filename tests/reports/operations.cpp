@@ -183,7 +183,8 @@ Vector3d two_steps(IntegratorKind kind) {
   Motion motion;
   motion.x = kStart;
   integrator->start(dynamics, 0, kStep, kVelocity, motion);
-  for (int step = 0; step < 2; ++step) integrator->advance(dynamics, step * kStep, kStep, motion);
+  for (int step = 0; step < 2; ++step)
+    integrator->advance(dynamics, step * kStep, kStep, 1, motion);
   return motion.x;
 }
 

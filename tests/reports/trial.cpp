@@ -221,7 +221,10 @@ Outcome run(const Case& given, const NamedAccuracy& stated, int frames) {
   scene.solver.step_bound = stated.step_bound.value_or(scene.solver.step_bound);
   scene.solver.integrator = stated.integrator.value_or(scene.solver.integrator);
   if (stated.self_weight_strain) scene.solver.max_self_weight_strain = stated.self_weight_strain;
-  if (!given.triangles) scene.sheets[0].bending = default_bending(stated.accuracy);
+  scene.solver.slow_forces_every =
+      stated.slow_forces_every.value_or(scene.solver.slow_forces_every);
+  if (!given.triangles)
+    scene.sheets[0].bending = stated.bending.value_or(default_bending(stated.accuracy));
   return run(Simulation(std::move(scene)), frames);
 }
 

@@ -68,6 +68,8 @@ struct NamedAccuracy {
   std::optional<StepBound> step_bound{};
   std::optional<IntegratorKind> integrator{};
   std::optional<double> self_weight_strain{};
+  std::optional<int> slow_forces_every{};
+  std::optional<BendingLaw> bending{};
 };
 Outcome run(const Case& given, const NamedAccuracy& stated, int frames);
 

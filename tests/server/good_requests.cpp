@@ -168,6 +168,7 @@ v1::Scene full_scene() {
   scene.mutable_solver()->set_step_bound(v1::STEP_BOUND_UNSHEARED);
   scene.mutable_solver()->set_max_repairs(5);
   scene.mutable_solver()->set_max_self_weight_strain(0.5);
+  scene.mutable_solver()->set_slow_forces_every(2);
   return scene;
 }
 

@@ -216,6 +216,8 @@ TEST(Accuracy, SetsWhatASceneLeavesOpenAndNothingElse) {
   EXPECT_EQ(standard.scene().solver().step_bound(), v1::STEP_BOUND_EVERY_SHAPE);
   EXPECT_EQ(draft.scene().solver().integrator(), v1::INTEGRATOR_VERLET_LAGGED);
   EXPECT_EQ(standard.scene().solver().integrator(), v1::INTEGRATOR_VERLET);
+  EXPECT_EQ(draft.scene().solver().slow_forces_every(), 4);
+  EXPECT_EQ(standard.scene().solver().slow_forces_every(), 1);
 
   const v1::Session fine = created(v1::ACCURACY_FINE);
   EXPECT_EQ(fine.scene().solver().precision(), v1::PRECISION_DOUBLE);

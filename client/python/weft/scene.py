@@ -468,6 +468,7 @@ class SolverSettings(Value):
     max_repairs: int | None = None
     max_self_weight_strain: float | None = None
     step_bound: StepBound | None = None
+    slow_forces_every: int | None = None
 
 
 @dataclass(eq=False)

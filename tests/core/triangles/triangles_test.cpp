@@ -227,7 +227,7 @@ struct MeshCase {
     std::int64_t step = 0;
     for (const auto& row : rows) {
       for (; step < std::llround(row[0] / dt); ++step)
-        solver->advance(static_cast<double>(step) * dt, calling_thread());
+        solver->advance(static_cast<double>(step) * dt, 1, calling_thread());
       Matrix3Xd x;
       solver->positions(x);
       const Eigen::Map<const Matrix3Xd> truth(row.data() + 1, 3, start.cols());

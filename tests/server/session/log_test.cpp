@@ -325,6 +325,7 @@ void expect_equal(const Session& found, const Session& wanted) {
   EXPECT_EQ(a.textiles, b.textiles);
   EXPECT_EQ(a.plan->step.estimated_bound, b.plan->step.estimated_bound);
   EXPECT_EQ(a.plan->step.unsheared_bound, b.plan->step.unsheared_bound);
+  EXPECT_EQ(a.plan->step.slow_every, b.plan->step.slow_every);
 }
 
 TEST_F(SessionLogTest, WithASnapshotComputesOnlyWhatCameAfterIt) {

@@ -18,8 +18,8 @@ class FaultySolver : public SheetSolver {
     struck_ = false;
     solver_->start(x, v, time, dt);
   }
-  void advance(double time, ThreadPool& pool) override {
-    solver_->advance(time, pool);
+  void advance(double time, int slow, ThreadPool& pool) override {
+    solver_->advance(time, slow, pool);
     if (time < from_ || *times_ == 0 || std::exchange(struck_, true)) return;
     --*times_;
     Matrix3Xd x;

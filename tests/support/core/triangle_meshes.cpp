@@ -96,7 +96,7 @@ double measured_step(const Mesh& mesh, const Matrix3Xd& x) {
     solver->start(start, Matrix3Xd::Zero(3, x.cols()), 0, dt);
     Matrix3Xd now;
     for (int k = 0; k < 1500; ++k) {
-      solver->advance(k * dt, calling_thread());
+      solver->advance(k * dt, 1, calling_thread());
       if (k % 50 != 0) continue;
       solver->positions(now);
       if (!((now - x).cwiseAbs().maxCoeff() < 1e-6)) return true;

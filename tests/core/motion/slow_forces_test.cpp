@@ -1,0 +1,186 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "core/sheet_factory.h"
+#include "tests/support/core/scenes.h"
+
+namespace weft::testing {
+namespace {
+
+MeasuredTextile supple(double rigidity) {
+  return {.areal_density = 0.2,
+          .tensile_warp = 800,
+          .tensile_weft = 600,
+          .shear = 100,
+          .bend_rigidity_warp = rigidity,
+          .bend_rigidity_weft = rigidity,
+          .air_drag = 0};
+}
+
+// Hangs by two corners; what bends it changes slowly.
+Scene hung(int slow_every, double rigidity = 1e-5) {
+  SheetDefinition sheet = flat_sheet(15, 15, 1.0 / 14);
+  sheet.textile = {supple(rigidity), 0.02, 0.3};
+  sheet.bending = Isometric{};
+  sheet.pins = {{{0, 14}, {}}};
+  Scene scene = floating(sheet);
+  scene.environment.gravity = {0, -9.8, 0};
+  scene.solver.precision = Precision::kDouble;
+  scene.solver.slow_forces_every = slow_every;
+  return scene;
+}
+
+Matrix3Xd ran(Scene scene, int frames) {
+  Simulation simulation(std::move(scene));
+  for (int k = 0; k < frames; ++k) EXPECT_TRUE(simulation.advance_frame());
+  return positions(simulation);
+}
+
+double apart(const Matrix3Xd& a, const Matrix3Xd& b) {
+  return std::sqrt((a - b).colwise().squaredNorm().mean());
+}
+
+TEST(SlowForces, AreOfSecondOrderInTheTimeBetweenThem) {
+  const auto bent = [](int slow_every, double substep) {
+    Scene scene = hung(slow_every, 1e-3);
+    scene.sheets[0].textile.damping = 0;
+    scene.environment.gravity.setZero();
+    // a bend whose own oscillation the step resolves well
+    Matrix3Xd x = start_positions(scene.sheets[0]);
+    for (Eigen::Index i = 0; i < x.cols(); ++i) x(1, i) += 5e-3 * std::cos(3 * x(0, i));
+    scene.sheets[0].start_positions = values(x);
+    scene.solver.substep = substep;
+    const Simulation simulation(scene);
+    EXPECT_EQ(simulation.plan().step.slow_every, slow_every);
+    return ran(scene, 12);
+  };
+  constexpr double kStep = 1.0 / 60 / 512;
+  const Matrix3Xd truth = bent(1, kStep / 8);
+  const double error = apart(bent(8, kStep), truth), halved = apart(bent(8, kStep / 2), truth);
+  RecordProperty("rms_m", std::to_string(error * 1e9) + " nm");
+  EXPECT_LT(error, 1e-6);
+  EXPECT_NEAR(error / halved, 4, 0.6);
+}
+
+TEST(SlowForces, LetASheetFallThroughAirAsItsEquationSays) {
+  constexpr double kRate = 2, kGravity = 9.8;  // 1/s, m/s^2
+  for (const int slow_every : {1, 4, 12}) {
+    Scene scene = hung(slow_every);
+    auto& textile = std::get<MeasuredTextile>(scene.sheets[0].textile.model);
+    textile.air_drag = kRate * textile.areal_density;
+    scene.sheets[0].pins.clear();
+    Simulation simulation(scene);
+    EXPECT_EQ(simulation.plan().step.slow_every, slow_every);
+    for (int k = 0; k < 60; ++k) ASSERT_TRUE(simulation.advance_frame());
+    const double fallen = start_positions(scene.sheets[0])(1, 0) - positions(simulation)(1, 0);
+    const double time = simulation.time();
+    const double wanted = kGravity / kRate * (time - (1 - std::exp(-kRate * time)) / kRate);
+    EXPECT_NEAR(fallen, wanted, 5e-5 * wanted) << slow_every;
+  }
+}
+
+TEST(SlowForces, ChangeAHungSheetByMuchLessThanDraftIsOff) {
+  for (const bool windy : {false, true}) {
+    const auto after_a_fifth = [&](int slow_every) {
+      Scene scene = hung(slow_every);
+      if (windy) scene.environment.wind = Wind{.velocity = {1, 0, 3}};
+      EXPECT_EQ(Simulation(scene).plan().step.slow_every, slow_every);
+      return ran(scene, 20);
+    };
+    const Matrix3Xd each = after_a_fifth(1);
+    for (const int slow_every : {2, 4})
+      EXPECT_LT(apart(after_a_fifth(slow_every), each), windy ? 2e-4 : 2e-6) << slow_every;
+  }
+}
+
+// Notes how strongly slow forces act in each step.
+class Noting : public SheetSolver {
+ public:
+  Noting(std::unique_ptr<SheetSolver> solver, std::vector<int>& noted)
+      : solver_(std::move(solver)), noted_(noted) {}
+  void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
+    solver_->start(x, v, time, dt);
+  }
+  void advance(double time, int slow, ThreadPool& pool) override {
+    noted_.push_back(slow);
+    solver_->advance(time, slow, pool);
+  }
+  void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
+    solver_->move_held(particle, x, d);
+  }
+  void pull_back(ThreadPool& pool) override { solver_->pull_back(pool); }
+  void resolve(const Contacts& contacts, ThreadPool& pool) override {
+    solver_->resolve(contacts, pool);
+  }
+  void measure() override { solver_->measure(); }
+  double moved() const override { return solver_->moved(); }
+  double pushed() const override { return solver_->pushed(); }
+  void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
+            Eigen::Ref<Matrix3Xd> d) const override {
+    solver_->read(particles, x, d);
+  }
+  void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
+                const Eigen::Ref<const Matrix3Xd>& in_step) override {
+    solver_->displace(particles, by, in_step);
+  }
+  void positions(Matrix3Xd& x) const override { solver_->positions(x); }
+  void velocities(Matrix3Xd& v) const override { solver_->velocities(v); }
+  void closing_velocities(double time, Matrix3Xd& v) const override {
+    solver_->closing_velocities(time, v);
+  }
+  std::string save() const override { return solver_->save(); }
+  bool load(const std::string& saved) override { return solver_->load(saved); }
+
+ private:
+  std::unique_ptr<SheetSolver> solver_;
+  std::vector<int>& noted_;
+};
+
+TEST(SlowForces, AreAskedForOnceInAGroupOfSubstepsAndStandForAllOfThem) {
+  Scene scene = hung(4);
+  scene.solver.substep = scene.solver.frame_step / 90;
+  std::vector<int> noted;
+  Simulation simulation(scene, [&](const Scene& given, const SheetDefinition& sheet,
+                                   const Mesh& mesh, const Dynamics& dynamics) {
+    return std::make_unique<Noting>(make_solver(given, sheet, mesh, dynamics), noted);
+  });
+  ASSERT_TRUE(simulation.advance_frame());
+  ASSERT_EQ(noted.size(), 90);
+  EXPECT_EQ(90 - std::count(noted.begin(), noted.end(), 0), 23);
+  for (std::size_t k = 0; k < noted.size(); k += static_cast<std::size_t>(noted[k]))
+    ASSERT_THAT(noted[k], ::testing::AnyOf(3, 4)) << k;
+  EXPECT_EQ(std::accumulate(noted.begin(), noted.end(), 0), 90);
+}
+
+TEST(SlowForces, ActOftenerWhereTheyAreNotSlowBesideTheStep) {
+  const auto every = [](const Scene& scene) { return Simulation(scene).plan().step.slow_every; };
+  EXPECT_EQ(every(hung(12)), 12);
+  EXPECT_EQ(every(hung(16, 0.05)), 1);  // as stiff in bending as in its plane
+
+  Scene stormy = hung(16);
+  stormy.environment.wind = Wind{.velocity = {0, 0, 60}};
+  EXPECT_THAT(every(stormy), ::testing::AllOf(::testing::Ge(1), ::testing::Lt(8)));
+
+  Scene other = hung(16);
+  other.solver.integrator = IntegratorKind::kRk4;
+  EXPECT_EQ(every(other), 1);
+}
+
+TEST(SlowForces, StandInThePlan) {
+  const auto passes = [](int slow_every) {
+    Scene scene = hung(slow_every);
+    scene.environment.wind = Wind{.velocity = {1, 0, 0}};
+    return Simulation(scene).plan().passes;
+  };
+  using ::testing::Contains;
+  EXPECT_THAT(passes(4), Contains("wind, every 4 substeps"));
+  EXPECT_THAT(passes(4), Contains(::testing::EndsWith("stencils, every 4 substeps")));
+  EXPECT_THAT(passes(1), Contains("wind"));
+}
+
+}  // namespace
+}  // namespace weft::testing

@@ -72,8 +72,8 @@ struct SweepLaw {
   BendLaw<T> none;                                // no force, for rows that do not exist
   T isometric_warp = 0, isometric_warp_edge = 0;  // N/m
   T isometric_weft = 0, isometric_twist = 0;
-  T slow = 1;  // how many times as strongly the isometric law acts in this substep
-  T damping = 0;                                     // k_d / (2 dt), kg/s^2
+  T slow = 1;     // how many times as strongly the isometric law acts in this substep
+  T damping = 0;  // k_d / (2 dt), kg/s^2
   bool damp_far = false, damp_far_diagonal = false;  // bend connections damp too
   T drag = 0, drag_share = 1;                        // c dt / m, 1 / (1 + drag / 2)
   WindLaw<T> wind;

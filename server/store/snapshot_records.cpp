@@ -21,8 +21,9 @@ namespace stored = storage::v1;
 
 Plan plan_of(const v1::Plan& from) {
   Plan plan;
-  plan.step = {from.substeps_per_frame(), from.substep_s(),     from.linear_bound_s(),
-               from.estimated_bound_s(),  from.damping_ratio(), from.limiting_sheet(),
+  plan.step = {from.substeps_per_frame(), from.substep_s(),
+               from.linear_bound_s(),     from.estimated_bound_s(),
+               from.damping_ratio(),      from.limiting_sheet(),
                from.unsheared_bound_s(),  std::max(1, from.slow_forces_every())};
   plan.passes.assign(from.passes().begin(), from.passes().end());
   for (const auto& each : from.skipped()) plan.skipped.push_back({each.pass(), each.reason()});

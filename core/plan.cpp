@@ -124,17 +124,17 @@ double bending_stiffness(const PlannedSheet& sheet) {
 
 // Substeps in one of which slow forces may act: as many as the scene bears, where they then are a
 // small part of what bounds the step, and where impulses in time with the stiffest modes feed these
-// by less than the damping that every sheet has takes away.
-int slow_every(const Scene& scene, const std::vector<PlannedSheet>& planned, const StepPlan& step) {
+// by less than damping takes away, that of a relaxation too.
+int slow_every(const Scene& scene, const std::vector<PlannedSheet>& planned,
+               const std::vector<StableStep>& steps, const StepPlan& step) {
   constexpr double kMostOfBound = 0.25;  // of 4
-  constexpr double kMostStiffness = 2e-3;
   std::int64_t every = std::min<std::int64_t>(scene.solver.slow_forces_every, step.substeps);
   if (every == 1 || !is_verlet(scene.solver.integrator)) return 1;
   const double dt = step.substep;
   for (std::size_t s = 0; s < planned.size(); ++s) {
     const Mesh& mesh = planned[s].mesh;
     const double stiffness = dt * dt * bending_stiffness(planned[s]);
-    if (stiffness > kMostStiffness) return 1;
+    if (stiffness > std::min(steps[s].connection_ratio, 2 * kSafeDampingRatio)) return 1;
     const SheetDefinition& sheet = scene.sheets[s];
     // particles on the border of a grid have as much less area as mass
     double rate = wind_rate(scene, std::holds_alternative<Grid>(sheet.shape)
@@ -559,7 +559,7 @@ Plan make_plan(const Scene& scene, const std::vector<PlannedSheet>& sheets) {
   Plan plan;
   const std::vector<StableStep> steps = stable_steps(scene, sheets);
   plan.step = plan_step(scene, steps, gain_of(scene, sheets, steps));
-  plan.step.slow_every = slow_every(scene, sheets, plan.step);
+  plan.step.slow_every = slow_every(scene, sheets, steps, plan.step);
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     plan.dampings.push_back(
         {scene.sheets[s].name, sheets[s].mesh.damping, steps[s].connection_ratio});

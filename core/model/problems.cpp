@@ -1,19 +1,13 @@
-#include <charconv>
 #include <cmath>
 #include <set>
 
 #include "core/model/actions.h"
 #include "core/model/mesh_problems.h"
 #include "core/model/scene.h"
+#include "core/model/text.h"
 
 namespace weft {
 namespace {
-
-std::string text(double value) {
-  char buffer[32];
-  const auto [end, error] = std::to_chars(buffer, buffer + sizeof buffer, value);
-  return {buffer, end};
-}
 
 std::string at(const std::string& field, std::size_t index) {
   return field + "[" + std::to_string(index) + "]";
@@ -36,7 +30,7 @@ class Check {
     if (value >= low && value <= high) return true;  // false for NaN
     const std::string suffix = *unit == '\0' ? "" : std::string(" ") + unit;
     problem(field,
-            text(value) + suffix + " is not within " + text(low) + " to " + text(high) + suffix);
+            exact(value) + suffix + " is not within " + exact(low) + " to " + exact(high) + suffix);
     return false;
   }
 
@@ -54,7 +48,8 @@ class Check {
     good &= number(field + ".x", q.x(), -kMostPart, kMostPart, "");
     good &= number(field + ".y", q.y(), -kMostPart, kMostPart, "");
     good &= number(field + ".z", q.z(), -kMostPart, kMostPart, "");
-    if (good && q.norm() < 1e-9) problem(field, "has length " + text(q.norm()) + "; must not be 0");
+    if (good && q.norm() < 1e-9)
+      problem(field, "has length " + exact(q.norm()) + "; must not be 0");
   }
 
   void path(const std::string& field, const Path& path) {
@@ -62,9 +57,9 @@ class Check {
       const std::string key = at(field, k);
       const bool good = number(key + ".time_s", path[k].time, 0, 1e6, "s");
       if (good && k > 0 && path[k].time <= path[k - 1].time)
-        problem(key + ".time_s", text(path[k].time) +
+        problem(key + ".time_s", exact(path[k].time) +
                                      " s does not come after the keyframe before it, " +
-                                     text(path[k - 1].time) + " s");
+                                     exact(path[k - 1].time) + " s");
       vector(key + ".offset_m", path[k].offset, kMostOffset, "m");
     }
   }
@@ -76,9 +71,9 @@ class Check {
       const double way = (path[k].offset - path[k - 1].offset).norm();
       const double time = path[k].time - path[k - 1].time;
       if (time > 0 && way > (1 + kRounding) * kMostColliderSpeed * time)
-        problem(at(field, k) + ".offset_m", "moves " + text(way) + " m in " + text(time) + " s, " +
-                                                text(way / time) + " m/s; colliders move at most " +
-                                                text(kMostColliderSpeed) + " m/s");
+        problem(at(field, k) + ".offset_m",
+                "moves " + exact(way) + " m in " + exact(time) + " s, " + exact(way / time) +
+                    " m/s; colliders move at most " + exact(kMostColliderSpeed) + " m/s");
     }
   }
 
@@ -239,7 +234,7 @@ void check_shape(const Plane& plane, const std::string& field, Check& check) {
   check.vector(field + ".plane.normal", plane.normal, 1e6, "");
   if (plane.normal.norm() < 1e-9)
     check.problem(field + ".plane.normal",
-                  "has length " + text(plane.normal.norm()) + "; must not be 0");
+                  "has length " + exact(plane.normal.norm()) + "; must not be 0");
 }
 
 constexpr double kSmallest = 1e-6, kLargest = 1e4;  // of a body, m
@@ -275,9 +270,9 @@ void check_reach(const Scene& scene, const Collider& collider, const std::string
   if (body == nullptr || !*body) return;
   for (const SheetDefinition& sheet : scene.sheets)
     if (const double skin = sheet.skin_or_default(); skin > (*body)->grid.reach)
-      check.problem(field + ".mesh", "keeps distances up to " + text((*body)->grid.reach) +
+      check.problem(field + ".mesh", "keeps distances up to " + exact((*body)->grid.reach) +
                                          " m; sheet \"" + sheet.name + "\" has a skin_m of " +
-                                         text(skin) + " m");
+                                         exact(skin) + " m");
 }
 
 // Between poses distances are known near the surface only, not deep below it.
@@ -288,8 +283,8 @@ void check_poses(const Scene& scene, const Collider& collider, const std::string
   const double first = collider.poses->times.front();
   if (collider.poses->times.size() > 1 && first < full)
     check.problem(field + (collider.asset.empty() ? ".mesh.data.poses.times_s[0]" : ".mesh.asset"),
-                  "leaves its first pose at " + text(first) +
-                      " s; it has dressing.deflate_m to grow back by until " + text(full) +
+                  "leaves its first pose at " + exact(first) +
+                      " s; it has dressing.deflate_m to grow back by until " + exact(full) +
                       " s (close_s + settle_s), and is not to move "
                       "before");
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <charconv>
 #include <sstream>
 #include <string>
 
@@ -12,6 +13,13 @@ std::string join(const Parts&... parts) {
   out.precision(4);
   (out << ... << parts);
   return out.str();
+}
+
+// All digits that it takes, so that who reads a bound can give it.
+inline std::string exact(double value) {
+  char buffer[32];
+  const auto [end, error] = std::to_chars(buffer, buffer + sizeof buffer, value);
+  return {buffer, end};
 }
 
 }  // namespace weft

@@ -22,14 +22,6 @@ bool is_name(const std::string& text) {
          text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_-") == std::string::npos;
 }
 
-// All digits of it, so that who reads a bound can give it.
-std::string exact(double value) {
-  std::ostringstream out;
-  out.precision(17);
-  out << value;
-  return out.str();
-}
-
 class PatternCheck {
  public:
   PatternCheck(const Pattern& pattern, double edge, const std::string& field,

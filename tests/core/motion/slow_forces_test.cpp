@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "core/sheet_factory.h"
 #include "tests/support/core/scenes.h"
+#include "tests/support/core/wrapped_solver.h"
 
 namespace weft::testing {
 namespace {
@@ -98,45 +101,16 @@ TEST(SlowForces, ChangeAHungSheetByMuchLessThanDraftIsOff) {
 }
 
 // Notes how strongly slow forces act in each step.
-class Noting : public SheetSolver {
+class Noting : public WrappedSolver {
  public:
   Noting(std::unique_ptr<SheetSolver> solver, std::vector<int>& noted)
-      : solver_(std::move(solver)), noted_(noted) {}
-  void start(const Matrix3Xd& x, const Matrix3Xd& v, double time, double dt) override {
-    solver_->start(x, v, time, dt);
-  }
+      : WrappedSolver(std::move(solver)), noted_(noted) {}
   void advance(double time, int slow, ThreadPool& pool) override {
     noted_.push_back(slow);
-    solver_->advance(time, slow, pool);
+    WrappedSolver::advance(time, slow, pool);
   }
-  void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
-    solver_->move_held(particle, x, d);
-  }
-  void pull_back(ThreadPool& pool) override { solver_->pull_back(pool); }
-  void resolve(const Contacts& contacts, ThreadPool& pool) override {
-    solver_->resolve(contacts, pool);
-  }
-  void measure() override { solver_->measure(); }
-  double moved() const override { return solver_->moved(); }
-  double pushed() const override { return solver_->pushed(); }
-  void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
-            Eigen::Ref<Matrix3Xd> d) const override {
-    solver_->read(particles, x, d);
-  }
-  void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
-                const Eigen::Ref<const Matrix3Xd>& in_step) override {
-    solver_->displace(particles, by, in_step);
-  }
-  void positions(Matrix3Xd& x) const override { solver_->positions(x); }
-  void velocities(Matrix3Xd& v) const override { solver_->velocities(v); }
-  void closing_velocities(double time, Matrix3Xd& v) const override {
-    solver_->closing_velocities(time, v);
-  }
-  std::string save() const override { return solver_->save(); }
-  bool load(const std::string& saved) override { return solver_->load(saved); }
 
  private:
-  std::unique_ptr<SheetSolver> solver_;
   std::vector<int>& noted_;
 };
 
@@ -172,6 +146,29 @@ TEST(SlowForces, ActOftenerWhereTheyAreNotSlowBesideTheStep) {
   Scene other = hung(16);
   other.solver.integrator = IntegratorKind::kRk4;
   EXPECT_EQ(every(other), 1);
+}
+
+// The other sheet, whose step and forces stay, has to know of it, or a snapshot would.
+TEST(SlowForces, OfAllSheetsFollowATextileThatChangesThePlan) {
+  Scene scene = hung(4);
+  scene.solver.substep = 2e-4;
+  scene.sheets.push_back(scene.sheets[0]);
+  scene.sheets[1].name = "other";
+  scene.sheets[1].origin.z() += 2;
+  Simulation simulation(scene);
+  for (int k = 0; k < 3; ++k) ASSERT_TRUE(simulation.advance_frame());
+  ASSERT_EQ(simulation.plan().step.slow_every, 4);
+  ASSERT_FALSE(simulation.set_textile(1, {supple(0.02), 0.02, 0.3}));
+  ASSERT_EQ(simulation.plan().step.slow_every, 1);
+  ASSERT_TRUE(simulation.advance_frame());
+
+  Simulation restored(scene);
+  ASSERT_TRUE(restored.restore(simulation.snapshot()));
+  for (Simulation* each : {&simulation, &restored}) {
+    ASSERT_FALSE(each->set_textile(0, {supple(2e-5), 0.02, 0.3}));
+    for (int k = 0; k < 3; ++k) ASSERT_TRUE(each->advance_frame());
+  }
+  EXPECT_EQ(hash_of(positions(restored)), hash_of(positions(simulation)));
 }
 
 TEST(SlowForces, StandInThePlan) {

@@ -17,8 +17,8 @@ std::unique_ptr<Integrator> make_integrator(IntegratorKind kind) {
   return make_verlet(lead_of(kind));
 }
 
-void add_up(const Dynamics& dynamics, double time, int slow, const Matrix3Xd& x, const Matrix3Xd& v,
-            Matrix3Xd& force) {
+void sum_forces(const Dynamics& dynamics, double time, int slow, const Matrix3Xd& x,
+                const Matrix3Xd& v, Matrix3Xd& force) {
   dynamics.force(time, x, v, force);
   if (slow == 0 || !dynamics.slow_force) return;
   if (slow == 1) return dynamics.slow_force(time, x, v, force);
@@ -30,7 +30,7 @@ void add_up(const Dynamics& dynamics, double time, int slow, const Matrix3Xd& x,
 void accelerate(const Dynamics& dynamics, double time, const Matrix3Xd& x, const Matrix3Xd& v,
                 Matrix3Xd& a) {
   const int slow = dynamics.slow_every;
-  add_up(dynamics, time, slow, x, v, a);
+  sum_forces(dynamics, time, slow, x, v, a);
   if (dynamics.drag.size() > 0) {
     const Vector3d air = dynamics.air(time);
     for (Eigen::Index i = 0; i < a.cols(); ++i)

@@ -64,8 +64,8 @@ std::unique_ptr<Integrator> make_rk4();
 std::unique_ptr<Integrator> make_integrator(IntegratorKind kind);
 
 // Writes forces but drag and weight, slow ones so many times as strong, N.
-void add_up(const Dynamics& dynamics, double time, int slow, const Matrix3Xd& x, const Matrix3Xd& v,
-            Matrix3Xd& force);
+void sum_forces(const Dynamics& dynamics, double time, int slow, const Matrix3Xd& x,
+                const Matrix3Xd& v, Matrix3Xd& force);
 // Acceleration with every force, as in a step in which slow ones act, m/s^2; 0 for held particles.
 void accelerate(const Dynamics& dynamics, double time, const Matrix3Xd& x, const Matrix3Xd& v,
                 Matrix3Xd& a);

@@ -32,7 +32,7 @@ double untangling_speed(const Scene& scene, double time) {
 
 // One frame, or a part of one. It is attempted until the guard trusts it.
 FramePart Simulation::State::advance_frame(const Enough& enough, ThreadPool& pool) {
-  if (!unfinished && !begin_frame(enough != nullptr)) return FramePart::kFailed;
+  if (!unfinished && !begin_frame(enough != nullptr, pool)) return FramePart::kFailed;
 
   if (!relax_coarser(enough, pool)) return FramePart::kUnfinished;
   NextStates& next = next_states(sheets.size());
@@ -119,12 +119,14 @@ Contacts Simulation::State::contacts_of(std::size_t sheet, double time, double d
 }
 
 // False: the frame cannot be computed.
-bool Simulation::State::begin_frame(bool in_parts) {
+bool Simulation::State::begin_frame(bool in_parts, ThreadPool& pool) {
   // saving costs as much as up to 17 substeps of a lattice in single precision
   constexpr std::int64_t kWorthSaving = 1000;
   std::optional<Snapshot> before;
   if (in_parts && (plan.step.substeps >= kWorthSaving || (relaxation && !relaxation->begun)))
     before = snapshot();
+  // before solvers begin anew and round places
+  if (cloth_contact && untangling_speed(scene, time()) > 0) cloth_contact->count_cuts(sheets, pool);
   if (!change_dressing() || !change_textiles()) return false;
   for (const MovingSheet& sheet : sheets) sheet.good();  // to go back to, and to show
   if (repairs.grow(frame + 1, plan.step)) begin_again();
@@ -203,9 +205,9 @@ void Simulation::State::restart_from(NextStates& next) {
 }
 
 // To be called where solvers start or load.
-void Simulation::State::forget_motion() {
+void Simulation::State::forget_motion(bool stays) {
   if (!cloth_contact) return;
-  cloth_contact->forget();
+  stays ? cloth_contact->forget_motion() : cloth_contact->forget();
   for (BoxEdges& edges : box_edges) edges.forget();
   for (MovingSheet& sheet : sheets) sheet.solver->measure();
 }

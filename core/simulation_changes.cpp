@@ -44,7 +44,7 @@ void Simulation::State::restart(const SheetStates& states, double old_dt,
     start(s, states.x[s], states.v[s], time());
     sheets[s].read_good();
   }
-  forget_motion();
+  forget_motion(true);
 }
 
 void Simulation::State::put_textile(std::size_t sheet, const Textile& textile) {

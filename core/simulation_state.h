@@ -75,7 +75,7 @@ struct Simulation::State {
 
   // frames
   FramePart advance_frame(const Enough& enough, ThreadPool& pool);
-  bool begin_frame(bool in_parts);
+  bool begin_frame(bool in_parts, ThreadPool& pool);
   bool take_substeps(const Enough& enough, ThreadPool& pool);
   void step(double time, double dt, int slow, bool ends_frame, ThreadPool& pool);
   Attempt inspect_sheets(NextStates& next, ThreadPool& pool);
@@ -83,7 +83,8 @@ struct Simulation::State {
   void begin_again();
   void start(std::size_t sheet, const Matrix3Xd& x, const Matrix3Xd& v, double time);
   void restart_from(NextStates& next);
-  void forget_motion();
+  // stays: everything is where it was at the end of the last frame.
+  void forget_motion(bool stays = false);
   bool keep_to_budget(NextStates& next);
   bool fail(const char* what, const std::string& reason);
   bool quiet(const NextStates& next) const;

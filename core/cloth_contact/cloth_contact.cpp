@@ -29,6 +29,11 @@ int ClothContact::most_steps(double dt, int halvings) {
 }
 
 void ClothContact::forget() {
+  forget_motion();
+  cuts_.reset();
+}
+
+void ClothContact::forget_motion() {
   lists_.forget();
   all_ = {};
   near_ = {};
@@ -37,7 +42,6 @@ void ClothContact::forget() {
   about_ = {};
   own_x_ = own_d_ = {};
   window_ = {};
-  cuts_.reset();
   come_ = moved_ = 0;
 }
 
@@ -190,7 +194,7 @@ void ClothContact::begin_frame(std::span<const MovingSheet> sheets, int halvings
   if (speed > 0)
     if (const std::vector<ClothPair>& cuts = cuts_of_last(sheets, pool); !cuts.empty())
       untangling_.set(cuts, good_positions(sheets), speed);
-  if (!was_empty || !untangling_.empty()) forget();
+  if (!was_empty || !untangling_.empty()) forget_motion();
 }
 
 std::int64_t ClothContact::first_cuts(std::span<const MovingSheet> sheets,
@@ -204,8 +208,8 @@ std::int64_t ClothContact::first_cuts(std::span<const MovingSheet> sheets,
   return first ? std::ssize(*cuts_) : 0;
 }
 
-std::int64_t ClothContact::count_cuts(std::span<const MovingSheet> sheets) {
-  return std::ssize(cuts_of_last(sheets, calling_thread()));
+std::int64_t ClothContact::count_cuts(std::span<const MovingSheet> sheets, ThreadPool& pool) {
+  return std::ssize(cuts_of_last(sheets, pool));
 }
 
 void ClothContact::read(std::span<MovingSheet> sheets, ThreadPool& pool) {

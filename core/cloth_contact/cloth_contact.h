@@ -30,6 +30,8 @@ class ClothContact {
   // Sheets may be anywhere now, or be held otherwise, at the begin of a frame. Nothing that was
   // found before is used, nor kept in memory.
   void forget();
+  // Sheets are where they were, but solvers begin anew: cuts stay known.
+  void forget_motion();
   // After how many steps of dt (s) it acts, at most, where windows are halved so often.
   static int most_steps(double dt, int halvings = 0);
 
@@ -51,7 +53,7 @@ class ClothContact {
   std::int64_t first_cuts(std::span<const MovingSheet> sheets, std::span<const SheetState> end,
                           ThreadPool& pool);
   // At the end of the last frame (cuts.h).
-  std::int64_t count_cuts(std::span<const MovingSheet> sheets);
+  std::int64_t count_cuts(std::span<const MovingSheet> sheets, ThreadPool& pool = calling_thread());
 
  private:
   // Steps after which contact acts once.

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
+#include <random>
 
 #include "core/cloth_contact/orientation.h"
 #include "tests/support/core/scenes.h"
@@ -44,6 +46,36 @@ TEST(Cuts, AreCountedWhereASheetStandsInAnother) {
   ASSERT_EQ(cuts.first.size(), 2u);
   EXPECT_EQ(cuts.first[0].edge_sheet, 0u);
   EXPECT_EQ(cuts.first[0].triangle_sheet, 1u);
+}
+
+// Crumpled, folded flat, or crumpled with places so coarse that much touches.
+TEST(Cuts, AreThoseOfEveryEdgeThroughEveryTriangle) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int some = 0;
+  for (int turn = 0; turn < 60; ++turn) {
+    const std::vector<SheetDefinition> sheets{flat_sheet(9, 7, 0.1), flat_sheet(4, 5, 0.1)};
+    std::vector<Matrix3Xd> x;
+    for (const SheetDefinition& sheet : sheets) {
+      Matrix3Xd& own = x.emplace_back(start_positions(sheet));
+      for (auto place : own.colwise()) {
+        if (turn % 3 == 1) place.y() = 0.02 * std::abs(place.x() - 0.31);
+        for (double& at : place) at += (turn % 3 == 1 ? 1e-3 : 0.08) * unit(random);
+        if (turn % 3 == 1 && place.x() > 0.31) place.x() = 0.62 - place.x();
+        if (turn % 3 == 2) place = (place * 20).array().round() / 20;
+      }
+    }
+    const Cloth cloth(sheets);
+    const Matrix3Xd all = cloth.positions(x);
+    std::int64_t expected = 0;
+    for (const auto& [p, q] : cloth.edges)
+      for (const auto& [a, b, c] : cloth.triangles)
+        if (p != a && p != b && p != c && q != a && q != b && q != c)
+          expected += cuts(all.col(p), all.col(q), all.col(a), all.col(b), all.col(c));
+    EXPECT_EQ(count_cuts(sheets, x).count, expected) << turn;
+    some += expected > 0;
+  }
+  EXPECT_GT(some, 40);
 }
 
 TEST(Cuts, OfOneEdgeThroughCommonEdgesAndCornersIsOne) {

@@ -127,7 +127,9 @@ void Simulation::State::dress(const DressingState& state) {
   const bool was_closed = sheets.front().dressing.ease == 1;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     sheets[s].dress(scene, capped(scene, s), state);
-    sheets[s].solver = make_solver(scene, simulated(s), sheets[s].mesh, sheets[s].dynamics);
+    auto anew = sheets[s].solver->made_anew();
+    sheets[s].solver = anew ? std::move(anew)
+                            : make_solver(scene, simulated(s), sheets[s].mesh, sheets[s].dynamics);
   }
   if (was_closed != (state.ease == 1)) make_cloth_contact();
 }

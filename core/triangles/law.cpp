@@ -37,6 +37,21 @@ Spokes spokes_of(int particles, const std::vector<Triangle>& triangles) {
   });
 }
 
+// Of those at a particle the first that leads to another; null: none does.
+const Spoke* find_spoke(const Spokes& spokes, int from, int to) {
+  const auto own = spokes.at(from);
+  const auto found = std::ranges::find(own, to, &Spoke::to);
+  return found == own.end() ? nullptr : &*found;
+}
+
+// Those of the membrane and those that wind presses on are the same.
+std::vector<Triangle> pulling(const Mesh& mesh) {
+  if (mesh.surface.membrane.empty()) return mesh.triangles;
+  std::vector<Triangle> corners;
+  for (const MembraneElement& element : mesh.surface.membrane) corners.push_back(element.particle);
+  return corners;
+}
+
 // Of each particle, the other ends of its edges and of connections that damp it, ascending.
 std::vector<std::vector<int>> neighbours_of(int particles, const Spokes& spokes, const Mesh& mesh) {
   std::vector<std::vector<int>> near(index(particles));
@@ -145,7 +160,6 @@ class Packing {
         corners_(pulling(mesh)),
         spokes_(spokes_of(particles_, corners_)),
         near_(neighbours_of(particles_, spokes_, mesh)),
-        bend_(corners_.size(), Vector3d::Zero()),
         far_(index(particles_)),
         nearby_(particles_),
         slot_(corners_.size()),
@@ -153,7 +167,7 @@ class Packing {
     law_.particles = particles_;
     law_.pushes = surface_.pushes;
     law_.bends = !surface_.fits.empty();
-    if (law_.bends) find_bending();
+    if (law_.bends) find_far();
     find_order();
   }
 
@@ -171,28 +185,12 @@ class Packing {
   static constexpr int kLanes = Law::kLanes, kBlock = Law::kBlock;
   static constexpr int kStride = 4 * sizeof(T) / 8;  // of a particle, as Near counts
 
-  // Those of the membrane and those that wind presses on are the same.
-  static std::vector<Triangle> pulling(const Mesh& mesh) {
-    if (mesh.surface.membrane.empty()) return mesh.triangles;
-    std::vector<Triangle> corners;
-    for (const MembraneElement& element : mesh.surface.membrane)
-      corners.push_back(element.particle);
-    return corners;
-  }
-
-  // Rows of bending, of which those along edges go to triangles.
-  void find_bending() {
+  void find_far() {
     BendingRows rows(surface_, particles_);
     for (int i = 0; i < particles_; ++i)
-      for (const Entry& entry : rows.row(i)) {
-        const auto own = spokes_.at(i);
-        const auto spoke = std::find_if(
-            own.begin(), own.end(), [&](const Spoke& each) { return each.to == entry.particle; });
-        if (spoke == own.end())
-          far_[index(i)].push_back(entry);
-        else if (i < entry.particle)
-          bend_[index(spoke->triangle)][spoke->edge] = entry.stiffness;
-      }
+      for (const Entry& entry : rows.row(i))
+        if (find_spoke(spokes_, i, entry.particle) == nullptr)
+          far_[index(i)].push_back(entry.particle);
   }
   std::size_t reaches(int i) const { return (far_[index(i)].size() + 3) / 4; }
 
@@ -231,7 +229,7 @@ class Packing {
       for (const int j : near_[index(order_[k])]) add(j);
     const int beside = nearby_.count();
     for (std::size_t k = first; k < last; ++k)
-      for (const Entry& entry : far_[index(order_[k])]) add(entry.particle);
+      for (const int j : far_[index(order_[k])]) add(j);
     return index(beside - own);
   }
   // Calls each with the triangles at a patch.
@@ -281,6 +279,7 @@ class Packing {
     std::copy(around_.begin(), around_.end(), law_.around.data());
     law_.corners = AlignedArray<Near>(groups_ * 3 * index(kLanes));
     law_.stiffness = AlignedArray<T>(groups_ * law_.constants() * index(kLanes));
+    law_.triangles.assign(groups_ * index(kLanes), -1);
     law_.gathers = AlignedArray<Gather<T>>(index(law_.blocks() * kBlock));
     law_.sides = AlignedArray<Side>(sides_);
     law_.reaches = AlignedArray<Reaches<T>>(reaches_);
@@ -296,7 +295,7 @@ class Packing {
     int triangles = 0;
     gather_triangles(number, patch, [&](int t) {
       slot_[index(t)] = triangles;
-      fill_triangle(index(t), patch.group + index(triangles / kLanes), index(triangles % kLanes));
+      put_triangle(t, patch.group + index(triangles / kLanes), index(triangles % kLanes));
       ++triangles;
     });
     Side* side = law_.sides.data() + patch.side;
@@ -312,19 +311,10 @@ class Packing {
     }
   }
 
-  void fill_triangle(std::size_t t, std::size_t group, std::size_t lane) {
+  void put_triangle(int t, std::size_t group, std::size_t lane) {
     for (std::size_t k = 0; k < 3; ++k)
-      law_.corners.data()[(group * 3 + k) * index(kLanes) + lane] = near(corners_[t][k]);
-    T* const constants = law_.stiffness.data() + group * law_.constants() * index(kLanes) + lane;
-    if (t < surface_.membrane.size()) {
-      const MembraneElement& element = surface_.membrane[t];
-      set_stiffness(element, surface_.stretch[index(element.panel)], law_.pushes, bend_[t],
-                    constants);
-    } else {
-      for (std::size_t k = 0; k < 3; ++k)
-        constants[(law_.constants() - 3 + k) * index(kLanes)] =
-            static_cast<T>(bend_[t][static_cast<Eigen::Index>(k)]);
-    }
+      law_.corners.data()[(group * 3 + k) * index(kLanes) + lane] = near(corners_[index(t)][k]);
+    law_.triangles[group * index(kLanes) + lane] = t;
   }
 
   // Tensions lie behind a group of zeros.
@@ -349,17 +339,11 @@ class Packing {
   }
 
   Reaches<T>* fill_reaches(int i, Gather<T>& gather, Reaches<T>* reach) {
-    const std::vector<Entry>& far = far_[index(i)];
-    double sum = 0;
+    const std::vector<int>& far = far_[index(i)];
     for (std::size_t n = 0; n < 4 * reaches(i); ++n) {
-      const bool is = n < far.size();
-      const T stiffness = is ? static_cast<T>(far[n].stiffness) : T(0);
-      reach[n / 4].particle[n % 4] = near(is ? far[n].particle : i);
-      reach[n / 4].stiffness[n % 4] = stiffness;
-      sum += double{stiffness};
+      reach[n / 4].particle[n % 4] = near(n < far.size() ? far[n] : i);
+      reach[n / 4].stiffness[n % 4] = 0;
     }
-    gather.reach_sum = static_cast<T>(sum);
-    gather.reach_error = static_cast<T>(double{gather.reach_sum} - sum);
     gather.reaches = static_cast<std::uint16_t>(reaches(i));
     return reach + reaches(i);
   }
@@ -380,8 +364,7 @@ class Packing {
   std::vector<Triangle> corners_;
   Spokes spokes_;
   std::vector<std::vector<int>> near_;  // particles along edges
-  std::vector<Vector3d> bend_;          // of each triangle, along its edges, N/m
-  std::vector<std::vector<Entry>> far_;
+  std::vector<std::vector<int>> far_;   // that bend the sheet there, but those, ascending
   std::vector<int> order_;
   Nearby nearby_;
   std::vector<int> slot_, slot_patch_;  // of each triangle: its place in a patch
@@ -394,12 +377,59 @@ class Packing {
 
 template <class T>
 std::optional<TriangleLaw<T>> make_triangle_law(const Mesh& mesh, bool blows) {
-  return Packing<T>(mesh, blows).law();
+  std::optional<TriangleLaw<T>> law = Packing<T>(mesh, blows).law();
+  if (law) law->set_constants(mesh);
+  return law;
+}
+
+// Rows of bending go to triangles along edges, and to particles.
+template <class T>
+void TriangleLaw<T>::set_constants(const Mesh& mesh) {
+  const Surface& surface = mesh.surface;
+  const std::vector<Triangle> pulled = pulling(mesh);
+  std::vector<Vector3d> bend(pulled.size(), Vector3d::Zero());  // along a triangle's edges, N/m
+  if (bends) {
+    const Spokes spokes = spokes_of(particles, pulled);
+    BendingRows rows(surface, particles);
+    std::vector<int> order(index(particles));
+    for (int i = 0; i < particles; ++i) order[index(place[index(i)])] = i;
+    Reaches<T>* reach = reaches.data();
+    for (int k = 0; k < particles; ++k) {
+      const int i = order[index(k)];
+      std::size_t n = 0;
+      double sum = 0;
+      for (const auto& [j, entry] : rows.row(i)) {
+        if (const Spoke* spoke = find_spoke(spokes, i, j)) {
+          if (i < j) bend[index(spoke->triangle)][spoke->edge] = entry;
+          continue;
+        }
+        sum += double{reach[n / 4].stiffness[n % 4] = static_cast<T>(entry)};
+        ++n;
+      }
+      Gather<T>& gather = gathers.data()[k];
+      gather.reach_sum = static_cast<T>(sum);
+      gather.reach_error = static_cast<T>(double{gather.reach_sum} - sum);
+      reach += gather.reaches;
+    }
+  }
+  for (std::size_t at = 0; at < triangles.size(); ++at) {
+    if (triangles[at] < 0) continue;
+    const std::size_t t = index(triangles[at]), lanes = index(kLanes);
+    T* const to = stiffness.data() + at / lanes * constants() * lanes + at % lanes;
+    if (t < surface.membrane.size()) {
+      const MembraneElement& element = surface.membrane[t];
+      set_stiffness(element, surface.stretch[index(element.panel)], pushes, bend[t], to);
+    } else {
+      for (std::size_t k = 0; k < 3; ++k)
+        to[(constants() - 3 + k) * lanes] = static_cast<T>(bend[t][static_cast<Eigen::Index>(k)]);
+    }
+  }
 }
 
 template <class T>
 void TriangleLaw<T>::release() {
-  around = {}, corners = {}, stiffness = {}, gathers = {}, sides = {}, reaches = {}, blown = {};
+  around = {}, corners = {}, stiffness = {}, triangles = {}, gathers = {}, sides = {}, reaches = {},
+  blown = {};
 }
 
 template <class T>
@@ -408,6 +438,7 @@ void TriangleLaw<T>::restore(const Mesh& mesh) {
   std::swap(around, made.around);
   std::swap(corners, made.corners);
   std::swap(stiffness, made.stiffness);
+  std::swap(triangles, made.triangles);
   std::swap(gathers, made.gathers);
   std::swap(sides, made.sides);
   std::swap(reaches, made.reaches);

@@ -70,13 +70,17 @@ struct TriangleLaw {
   // s_01, s_12, s_02, r_0, r_1, r_2. Otherwise three modes a_0, a_1, a_2, r, of warp and weft,
   // which only pull, and of shear: m = a . l^2 - r, tension of edge k: the sum of m a_k, less a
   // last three.
-  AlignedArray<T> stiffness;  // (groups x constants() x kLanes)
+  AlignedArray<T> stiffness;   // (groups x constants() x kLanes)
+  std::vector<int> triangles;  // of the mesh (groups x kLanes); -1 where there is none
   std::size_t constants() const { return pushes ? 9 : 15; }
 
   AlignedArray<Gather<T>> gathers;  // of each particle
   AlignedArray<Side> sides;
   AlignedArray<Reaches<T>> reaches;
   AlignedArray<Near> blown;  // of triangles
+  // Sets stiffness, gathers and reaches by a mesh of the same triangles, whose rest shape and
+  // stiffness may be others.
+  void set_constants(const Mesh& mesh);
   // Lets go of all these, until restore().
   void release();
   bool released() const { return gathers.size() == 0; }

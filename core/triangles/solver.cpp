@@ -20,17 +20,20 @@ namespace {
 template <class T>
 class TriangleSolver : public SheetSolver {
  public:
-  TriangleSolver(const Mesh& mesh, const Dynamics& dynamics, const std::optional<Wind>& wind,
+  TriangleSolver(const Mesh& mesh, const Dynamics& dynamics, const WindLaw<T>& wind,
                  bool compensated, IntegratorKind integrator, TriangleLaw<T> law)
       : mesh_(mesh),
         dynamics_(dynamics),
+        integrator_(integrator),
         particles_(static_cast<int>(mesh.mass.size())),
         law_(std::move(law)),
+        wind_(wind),
         state_(particles_, compensated, static_cast<T>(lead_of(integrator))),
         gaps_(static_cast<std::size_t>(law_.blocks()) * kRunsOfBlock, kRunsOfBlock) {
     law_.compensated = compensated;
     law_.drags = dynamics.drag.size() > 0;
-    if (wind) law_.wind = wind_ = make_wind_law<T>(*wind);
+    law_.measured = false;
+    law_.wind = wind;
     state_.prepare(law_);
     if (!mesh.surface.hinges.empty()) find_hinged();
   }
@@ -138,6 +141,13 @@ class TriangleSolver : public SheetSolver {
   int most_threads() const override {
     constexpr int kParticles = 2048;
     return std::max(1, particles_ / kParticles);
+  }
+
+  std::unique_ptr<SheetSolver> made_anew() override {
+    if (law_.released()) return nullptr;
+    law_.set_constants(mesh_);
+    return std::make_unique<TriangleSolver>(mesh_, dynamics_, wind_, law_.compensated, integrator_,
+                                            std::move(law_));
   }
 
   void release_memory() override {
@@ -327,6 +337,7 @@ class TriangleSolver : public SheetSolver {
 
   const Mesh& mesh_;
   const Dynamics& dynamics_;
+  const IntegratorKind integrator_;
   int particles_;
   double dt_ = 0;
   TriangleLaw<T> law_;
@@ -351,8 +362,9 @@ std::unique_ptr<SheetSolver> make(const Mesh& mesh, const Dynamics& dynamics,
                                   IntegratorKind integrator) {
   auto law = make_triangle_law<T>(mesh, wind.has_value());
   if (!law) return make_plain_solver(dynamics, integrator);
-  return std::make_unique<TriangleSolver<T>>(mesh, dynamics, wind, compensated, integrator,
-                                             std::move(*law));
+  return std::make_unique<TriangleSolver<T>>(mesh, dynamics,
+                                             wind ? make_wind_law<T>(*wind) : WindLaw<T>(),
+                                             compensated, integrator, std::move(*law));
 }
 
 }  // namespace

@@ -46,16 +46,14 @@ bool lie_apart(const Triangle& one, const Triangle& other, const Matrix3Xd& x) {
     const Vector3d between = sides[0] + sides[1] - others[0] - others[1];
     return heights(between, sides).low > 0 && heights(between, others).high < 0;
   }
-  const auto is_beyond = [&](const std::array<Vector3d, 2>& plane, const Vector3d& origin,
-                             const Triangle& triangle) {
-    const Vector3d normal = plane[0].cross(plane[1]);
-    const Heights own = heights(normal, plane);
-    const Heights there = heights<3>(
-        normal,
-        {x.col(triangle[0]) - origin, x.col(triangle[1]) - origin, x.col(triangle[2]) - origin});
-    return there.low > std::max(own.high, 0.0) || there.high < std::min(own.low, 0.0);
+  std::array<Vector3d, 3> there;
+  for (std::size_t k = 0; k < 3; ++k) there[k] = x.col(other[k]) - x.col(one[0]);
+  const auto separates = [&](const Vector3d& way) {
+    const Heights own = heights(way, sides), away = heights(way, there);
+    return away.low > std::max(own.high, 0.0) || away.high < std::min(own.low, 0.0);
   };
-  return is_beyond(sides, x.col(one[0]), other) || is_beyond(others, x.col(other[0]), one);
+  return separates(sides[0].cross(sides[1])) || separates(others[0].cross(others[1])) ||
+         separates(there[0] + there[1] + there[2] - sides[0] - sides[1]);
 }
 
 }  // namespace

@@ -85,7 +85,8 @@ bool may_meet(const std::vector<Vector2d>& one, const std::vector<Vector2d>& oth
 
 }  // namespace
 
-FlatPatches::FlatPatches(const Cloth& cloth) : cloth_(cloth) {
+FlatPatches::FlatPatches(const Cloth& cloth, int runs)
+    : cloth_(cloth), patches_(static_cast<std::size_t>(runs)) {
   const std::size_t blocks = cloth.first_block.size() - 1;
   std::vector<Vector2d> corners;
   // by piece, particles and place: how often
@@ -126,12 +127,6 @@ FlatPatches::FlatPatches(const Cloth& cloth) : cloth_(cloth) {
     if (side.first != 2) borders_.push_back(side.second);
   gradients_.resize(blocks);
   are_made_ = std::vector<MadeOnce>(blocks);
-}
-
-std::size_t FlatPatches::Hash::operator()(const std::array<int, 4>& blocks) const {
-  std::uint64_t sum = 0;
-  for (const int b : blocks) sum = (sum ^ static_cast<std::uint64_t>(b)) * 0x9e3779b97f4a7c15;
-  return static_cast<std::size_t>(sum >> 32);
 }
 
 void FlatPatches::set(const Eigen::Matrix4Xf& places, double farthest) {
@@ -197,9 +192,14 @@ double FlatPatches::distance(const Patch& over) {
 }
 
 FlatPatches::Patch& FlatPatches::patch(const Blocks& some, const Blocks& others) {
-  std::unique_lock lock(mutex_);
-  Patch& patch = patches_[{some.first, some.last, others.first, others.last}];
-  lock.unlock();
+  Patch& patch = [&]() -> Patch& {
+    const std::lock_guard lock(mutex_);
+    auto& known = patches_[static_cast<std::size_t>(some.number)];
+    auto at = std::ranges::lower_bound(known, others.number, {}, &Known::other);
+    if (at == known.end() || at->other != others.number)
+      at = known.insert(at, {others.number, std::make_unique<Patch>()});
+    return *at->patch;
+  }();
   patch.is_made.in(1, [&] { make(some, others, patch); });
   return patch;
 }

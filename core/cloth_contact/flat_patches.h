@@ -2,10 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <array>
-#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <mutex>
-#include <unordered_map>
 #include <vector>
 
 #include "core/cloth_contact/cloth.h"
@@ -21,14 +20,15 @@ namespace weft {
 // high.
 class FlatPatches {
  public:
-  explicit FlatPatches(const Cloth& cloth);
+  // runs: beyond the numbers of all runs of blocks that are asked for.
+  FlatPatches(const Cloth& cloth, int runs);
 
   // From now on cloth is at `places`, (4 x particles) m in single precision, no coordinate beyond
   // `farthest`, which outlive what is asked.
   void set(const Eigen::Matrix4Xf& places, double farthest);
-  // Blocks first ... last - 1.
+  // Blocks first ... last - 1, a run with a number of its own.
   struct Blocks {
-    int first, last;
+    int number, first, last;
   };
   // The least distance between particles and edges of some blocks and others, or within these, that
   // share no particle, at least, m; 0 where none is known. Threads may ask at the same time.
@@ -60,8 +60,9 @@ class FlatPatches {
     Vector2d from, to;
   };
 
-  struct Hash {
-    std::size_t operator()(const std::array<int, 4>& blocks) const;
+  struct Known {
+    int other;  // run
+    std::unique_ptr<Patch> patch;
   };
 
   Patch& patch(const Blocks& some, const Blocks& others);
@@ -77,8 +78,8 @@ class FlatPatches {
   std::vector<Box> box_;              // around these
   std::vector<double> least_height_;  // of each block, m
   std::vector<Border> borders_;
-  std::mutex mutex_;  // of patches_, but not of what is in these
-  std::unordered_map<std::array<int, 4>, Patch, Hash> patches_;
+  std::mutex mutex_;                         // of patches_, but not of what is in these
+  std::vector<std::vector<Known>> patches_;  // of each run, ascending
 
   const Eigen::Matrix4Xf* places_ = nullptr;
   double farthest_ = 0;               // m

@@ -6,7 +6,7 @@ namespace weft {
 
 NearBlocks::NearBlocks(const Cloth& cloth)
     : cloth_(cloth),
-      flat_(cloth),
+      flat_(cloth, 4 * static_cast<int>(cloth.first_block.size() - 1)),
       box_(cloth.first_block.size() - 1),
       is_boxed_(box_.size()),
       has_boxes_(box_.size()),
@@ -78,7 +78,7 @@ void NearBlocks::box_node(const Node& node) {
 void NearBlocks::number_node(const Node& node) {
   constexpr int kFlatTogether = 8;
   if (node.count() <= kFlatTogether && around_.size() == static_cast<std::size_t>(node.first))
-    around_.resize(static_cast<std::size_t>(node.last), {node.first, node.last});
+    around_.resize(static_cast<std::size_t>(node.last), {node.number, node.first, node.last});
   if (node.count() == 1) {
     number_[static_cast<std::size_t>(node.first)] = node.number;
     return;
@@ -93,9 +93,9 @@ double NearBlocks::distance(const BlockPair& blocks, double enough) {
   if (between > 0) return between;
   const double together = flat_.distance(around_[static_cast<std::size_t>(one)],
                                          around_[static_cast<std::size_t>(other)]);
-  return together >= enough
-             ? together
-             : std::max(together, flat_.distance({one, one + 1}, {other, other + 1}));
+  return together >= enough ? together
+                            : std::max(together, flat_.distance({number(one), one, one + 1},
+                                                                {number(other), other, other + 1}));
 }
 
 void NearBlocks::box_parts(int block) {

@@ -83,7 +83,8 @@ class NearBlocks {
   double distance_if_flat(const Node& one, const Node& other) {
     constexpr int kMost = 64;  // blocks
     if (one.count() + other.count() > kMost) return 0;
-    return flat_.distance({one.first, one.last}, {other.first, other.last});
+    return flat_.distance({one.number, one.first, one.last},
+                          {other.number, other.first, other.last});
   }
   // Of two blocks every two triangles, every two edges, or every particle of the one and triangle
   // of the other, whose boxes are no farther apart than `reach`, m; rounding may add some. Until

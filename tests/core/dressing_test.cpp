@@ -6,11 +6,13 @@
 
 #include "core/cloth_contact/cuts.h"
 #include "core/forces/elastic.h"
+#include "core/sheet_factory.h"
 #include "core/simulation.h"
 #include "core/triangles/ease.h"
 #include "core/triangles/triangles.h"
 #include "core/verdict.h"
 #include "tests/support/core/scenes.h"
+#include "tests/support/core/wrapped_solver.h"
 
 namespace weft::testing {
 namespace {
@@ -181,6 +183,26 @@ TEST(Dressing, PanelsCloseAroundABodyAndKeepTheirSize) {
   const Matrix3Xd x = positions(simulation);
   EXPECT_GT(std::sqrt((x.row(0).array().square() + x.row(2).array().square()).minCoeff()), 0.05);
   EXPECT_TRUE(simulation.repairs().empty());
+}
+
+// With a fold along a seam, whose angle eases, too.
+TEST(Dressing, ASheetThatKeepsItsSolverMovesAsOneWhoseSolverIsMadeAnew) {
+  Scene scene = around_pole(0.05);
+  TriangleMesh folded = sewn_tube();
+  Fold& fold = folded.folds.emplace_back();
+  fold.angle = 1;
+  for (int row = 0; row <= kTubeRows; ++row) fold.particles.push_back(row * (kTubeColumns + 1));
+  scene.sheets[0].shape = complete(folded);
+  const auto anew = [](const Scene& of, const SheetDefinition& sheet, const Mesh& its,
+                       const Dynamics& dynamics) -> std::unique_ptr<SheetSolver> {
+    return std::make_unique<WrappedSolver>(make_solver(of, sheet, its, dynamics));
+  };
+  Simulation kept(scene), made(scene, anew);
+  for (int frame = 0; frame < 60; ++frame) {
+    dress(kept, 1);
+    dress(made, 1);
+    ASSERT_EQ(positions(kept), positions(made)) << frame;
+  }
 }
 
 TEST(Dressing, AGarmentThatIsTooTightIsStretchedByWhatTheBodyIsLarger) {

@@ -9,6 +9,7 @@
 
 #include "core/cloth_contact/cuts.h"
 #include "core/frame_values.h"
+#include "core/model/self_weight.h"
 #include "core/model/strain.h"
 #include "core/model/text.h"
 #include "core/moving_sheet.h"
@@ -187,6 +188,24 @@ std::string loose_borders_text(const std::vector<LooseBorder>& borders) {
   return text;
 }
 
+bool any_is_capped(const Scene& scene) {
+  for (std::size_t s = 0; s < scene.sheets.size(); ++s) {
+    const SheetDefinition& given = scene.sheets[s];
+    const SheetDefinition simulated = capped(scene, s);
+    if (simulated.textile != given.textile ||
+        !std::ranges::equal(simulated.panel_textiles, given.panel_textiles, {},
+                            &PanelTextile::textile, &PanelTextile::textile))
+      return true;
+  }
+  return false;
+}
+
+std::string slid_text(const Scene& scene, double slid) {
+  return join("what was held has come down by ", 1000 * slid, " mm, more than ", 1000 * kMostSlid,
+              " mm: it is too wide there, or too smooth",
+              any_is_capped(scene) ? ", or, its stretch capped, too soft to hold" : "");
+}
+
 void find_faults(const Scene& scene, double time, Verdict& verdict) {
   const auto fault = [&](const char* code, const std::string& message) {
     verdict.faults.push_back({code, message});
@@ -199,10 +218,7 @@ void find_faults(const Scene& scene, double time, Verdict& verdict) {
   if (verdict.particles_inside > 0)
     fault("INSIDE_BODY", join(verdict.particles_inside, " particles are inside a collider, up to ",
                               1000 * verdict.deepest, " mm deep"));
-  if (verdict.slid > kMostSlid)
-    fault("SLID_DOWN",
-          join("what was held has come down by ", 1000 * verdict.slid, " mm, more than ",
-               1000 * kMostSlid, " mm: it is too wide there, or too smooth"));
+  if (verdict.slid > kMostSlid) fault("SLID_DOWN", slid_text(scene, verdict.slid));
   if (verdict.fallen > kMostFallen)
     fault("SLID_DOWN", join("the garment has come down by ", 1000 * verdict.fallen,
                             " mm, more than ", 1000 * kMostFallen, " mm: nothing holds it up"));

@@ -255,7 +255,13 @@ TEST(Dressing, IsJudgedByWhatIsWrongWithIt) {
   Simulation wide(scene);
   dress(wide, 150);
   EXPECT_EQ(codes(wide), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN", "BESIDE_BODY"}));
+  EXPECT_THAT(wide.verdict().faults[1].message, ::testing::EndsWith("or too smooth"));
+  scene.solver.max_self_weight_strain = 0.01;
+  Simulation soft(scene);
+  dress(soft, 150);
+  EXPECT_THAT(soft.verdict().faults[1].message, ::testing::HasSubstr("its stretch capped"));
 
+  scene.solver.max_self_weight_strain.reset();
   scene.dressing->holds.clear();
   Simulation falling(scene);
   dress(falling, 150);

@@ -71,10 +71,17 @@ std::vector<ClothPair> find_cuts(const Cloth& cloth, NearBlocks& near, const Mat
                                  ThreadPool& pool) {
   const auto look = [&](int edges_of, int triangle, std::vector<ClothPair>& found) {
     const auto& [a, b, c] = cloth.triangles[static_cast<std::size_t>(triangle)];
+    const Eigen::Array3d low = x.col(a).cwiseMin(x.col(b)).cwiseMin(x.col(c)),
+                         high = x.col(a).cwiseMax(x.col(b)).cwiseMax(x.col(c));
+    const auto beside = [&](int p, int q) {
+      return (x.col(p).array().max(x.col(q).array()) < low).any() ||
+             (x.col(p).array().min(x.col(q).array()) > high).any();
+    };
     const auto from = static_cast<std::size_t>(edges_of);
     for (int e = cloth.first_edge[from]; e < cloth.first_edge[from + 1]; ++e) {
       const auto& [p, q] = cloth.edges[static_cast<std::size_t>(e)];
       if (p == a || p == b || p == c || q == a || q == b || q == c) continue;
+      if (beside(p, q)) continue;
       if (cuts(x.col(p), x.col(q), x.col(a), x.col(b), x.col(c))) found.push_back({e, triangle});
     }
   };

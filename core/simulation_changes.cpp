@@ -127,9 +127,10 @@ void Simulation::State::dress(const DressingState& state) {
   const bool was_closed = sheets.front().dressing.ease == 1;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     sheets[s].dress(scene, capped(scene, s), state);
-    auto anew = sheets[s].solver->made_anew();
-    sheets[s].solver = anew ? std::move(anew)
-                            : make_solver(scene, simulated(s), sheets[s].mesh, sheets[s].dynamics);
+    auto renewed = sheets[s].solver->renewed();
+    sheets[s].solver = renewed
+                           ? std::move(renewed)
+                           : make_solver(scene, simulated(s), sheets[s].mesh, sheets[s].dynamics);
   }
   if (was_closed != (state.ease == 1)) make_cloth_contact();
 }

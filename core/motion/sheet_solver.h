@@ -42,10 +42,10 @@ class SheetSolver {
   virtual void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
                         const Eigen::Ref<const Matrix3Xd>& in_step) = 0;
 
-  // A solver as it would be made of the mesh and dynamics of this one, whose rest shape and
-  // stiffness have changed, sooner: with what stays, which this one lets go of. Null: there is
-  // none.
-  virtual std::unique_ptr<SheetSolver> made_anew() { return nullptr; }
+  // Once the rest shape and stiffness of its mesh have changed: a solver to start, the same as one
+  // made of mesh and dynamics, which takes over how this one has laid them out; this one must not
+  // be used any more. Null: it has to be made.
+  virtual std::unique_ptr<SheetSolver> renewed() { return nullptr; }
   // More than these have nothing to do in a pool.
   virtual int most_threads() const { return 1; }
   // Lets go of memory that only steps need, or that follows from mesh and dynamics. Until that is

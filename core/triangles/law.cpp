@@ -373,6 +373,38 @@ class Packing {
   Law law_;
 };
 
+// Sets what bends the sheet from farther away; returns what is left of rows of bending along the
+// edges of each triangle, N/m.
+template <class T>
+std::vector<Vector3d> set_bending(const Mesh& mesh, TriangleLaw<T>& law) {
+  const std::vector<Triangle> corners = pulling(mesh);
+  std::vector<Vector3d> along(corners.size(), Vector3d::Zero());
+  if (!law.bends) return along;
+  const Spokes spokes = spokes_of(law.particles, corners);
+  BendingRows rows(mesh.surface, law.particles);
+  std::vector<int> order(index(law.particles));
+  for (int i = 0; i < law.particles; ++i) order[index(law.place[index(i)])] = i;
+  Reaches<T>* reach = law.reaches.data();
+  for (int k = 0; k < law.particles; ++k) {
+    const int i = order[index(k)];
+    std::size_t n = 0;
+    double sum = 0;
+    for (const auto& [j, row] : rows.row(i)) {
+      if (const Spoke* spoke = find_spoke(spokes, i, j)) {
+        if (i < j) along[index(spoke->triangle)][spoke->edge] = row;
+        continue;
+      }
+      sum += double{reach[n / 4].stiffness[n % 4] = static_cast<T>(row)};
+      ++n;
+    }
+    Gather<T>& gather = law.gathers.data()[k];
+    gather.reach_sum = static_cast<T>(sum);
+    gather.reach_error = static_cast<T>(double{gather.reach_sum} - sum);
+    reach += gather.reaches;
+  }
+  return along;
+}
+
 }  // namespace
 
 template <class T>
@@ -382,36 +414,10 @@ std::optional<TriangleLaw<T>> make_triangle_law(const Mesh& mesh, bool blows) {
   return law;
 }
 
-// Rows of bending go to triangles along edges, and to particles.
 template <class T>
 void TriangleLaw<T>::set_constants(const Mesh& mesh) {
   const Surface& surface = mesh.surface;
-  const std::vector<Triangle> pulled = pulling(mesh);
-  std::vector<Vector3d> bend(pulled.size(), Vector3d::Zero());  // along a triangle's edges, N/m
-  if (bends) {
-    const Spokes spokes = spokes_of(particles, pulled);
-    BendingRows rows(surface, particles);
-    std::vector<int> order(index(particles));
-    for (int i = 0; i < particles; ++i) order[index(place[index(i)])] = i;
-    Reaches<T>* reach = reaches.data();
-    for (int k = 0; k < particles; ++k) {
-      const int i = order[index(k)];
-      std::size_t n = 0;
-      double sum = 0;
-      for (const auto& [j, entry] : rows.row(i)) {
-        if (const Spoke* spoke = find_spoke(spokes, i, j)) {
-          if (i < j) bend[index(spoke->triangle)][spoke->edge] = entry;
-          continue;
-        }
-        sum += double{reach[n / 4].stiffness[n % 4] = static_cast<T>(entry)};
-        ++n;
-      }
-      Gather<T>& gather = gathers.data()[k];
-      gather.reach_sum = static_cast<T>(sum);
-      gather.reach_error = static_cast<T>(double{gather.reach_sum} - sum);
-      reach += gather.reaches;
-    }
-  }
+  const std::vector<Vector3d> bend = set_bending(mesh, *this);
   for (std::size_t at = 0; at < triangles.size(); ++at) {
     if (triangles[at] < 0) continue;
     const std::size_t t = index(triangles[at]), lanes = index(kLanes);

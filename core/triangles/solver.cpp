@@ -143,7 +143,7 @@ class TriangleSolver : public SheetSolver {
     return std::max(1, particles_ / kParticles);
   }
 
-  std::unique_ptr<SheetSolver> made_anew() override {
+  std::unique_ptr<SheetSolver> renewed() override {
     if (law_.released()) return nullptr;
     law_.set_constants(mesh_);
     return std::make_unique<TriangleSolver>(mesh_, dynamics_, wind_, law_.compensated, integrator_,

@@ -98,6 +98,15 @@ double NearBlocks::distance(const BlockPair& blocks, double enough) {
                                                                 {number(other), other, other + 1}));
 }
 
+bool NearBlocks::are_joined(const BlockPair& blocks) const {
+  const std::span<const int> one = particles(blocks.one), other = particles(blocks.other);
+  for (auto i = one.begin(), j = other.begin(); i != one.end() && j != other.end();) {
+    if (*i == *j) return true;
+    ++(*i < *j ? i : j);
+  }
+  return false;
+}
+
 void NearBlocks::box_parts(int block) {
   const auto b = static_cast<std::size_t>(block);
   has_boxes_[b].in(now_, [&] {

@@ -86,6 +86,8 @@ class NearBlocks {
     return flat_.distance({one.number, one.first, one.last},
                           {other.number, other.first, other.last});
   }
+  // Whether they share a particle.
+  bool are_joined(const BlockPair& blocks) const;
   // Of two blocks every two triangles, every two edges, or every particle of the one and triangle
   // of the other, whose boxes are no farther apart than `reach`, m; rounding may add some. Until
   // one of these is called again with the same search. Threads may ask at the same time, each with

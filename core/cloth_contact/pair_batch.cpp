@@ -16,9 +16,42 @@ using Values = hn::Vec<PairTag>;
 using Point = Triple<Values>;
 
 HWY_INLINE Values of(double value) { return hn::Set(PairTag(), value); }
-HWY_INLINE Point load_point(const double (*planes)[PairBatch::kMost], std::size_t at) {
+#if HWY_TARGET == HWY_SCALAR
+template <class Of>
+HWY_INLINE Point load_point(const Of& values) {
+  const double* point = values(0);
+  return {of(point[0]), of(point[1]), of(point[2])};
+}
+#else
+template <class D, class F>
+HWY_INLINE hn::Vec<D> load_twos(D d, const F& f, std::size_t first) {
+  if constexpr (hn::MaxLanes(D()) == 2) {
+    return hn::LoadU(hn::FixedTag<double, 2>(), f(first));
+  } else {
+    const hn::Half<D> half;
+    return hn::Combine(d, load_twos(half, f, first + hn::MaxLanes(half)),
+                       load_twos(half, f, first));
+  }
+}
+// values(k): where the three values of the k-th lie.
+template <class Of>
+HWY_INLINE Point load_point(const Of& values) {
   const PairTag d;
-  return {hn::Load(d, planes[0] + at), hn::Load(d, planes[1] + at), hn::Load(d, planes[2] + at)};
+  // of those with even and odd numbers
+  const auto twos = [&](std::size_t odd, std::size_t axis) HWY_ATTR {
+    return load_twos(
+        d, [&](std::size_t k) { return values(k + odd) + axis; }, 0);
+  };
+  const Values even = twos(0, 0), odd = twos(1, 0);
+  return {hn::InterleaveLower(d, even, odd), hn::InterleaveUpper(d, even, odd),
+          hn::InterleaveUpper(d, twos(0, 1), twos(1, 1))};
+}
+#endif
+// One particle of each pair from `at` on.
+HWY_INLINE Point load_point(const PairBatch::Planes& planes, std::size_t particle, std::size_t at) {
+  return load_point([&](std::size_t k) {
+    return planes.x + std::ptrdiff_t{3} * planes.particles[at + k][particle];
+  });
 }
 // a / b within 0 to 1; 0 where b is not above 0
 HWY_INLINE Values share(Values a, Values b) {
@@ -38,8 +71,8 @@ void solve_corners(const PairBatch::Planes& planes) {
   const PairTag d;
   const Values zero = of(0), one = of(1);
   for (std::size_t at = 0; at < planes.size; at += hn::Lanes(d)) {
-    const Point p = load_point(planes.points, at), a = load_point(planes.points + 3, at),
-                b = load_point(planes.points + 6, at), c = load_point(planes.points + 9, at);
+    const Point p = load_point(planes, 0, at), a = load_point(planes, 1, at),
+                b = load_point(planes, 2, at), c = load_point(planes, 3, at);
     const Point ab = minus(b, a), ac = minus(c, a), bc = minus(c, b), ap = minus(p, a),
                 bp = minus(p, b), normal = product(ab, ac);
     const Values area = squared(normal);
@@ -77,8 +110,8 @@ void solve_edges(const PairBatch::Planes& planes) {
   const PairTag tag;
   const Values one = of(1);
   for (std::size_t at = 0; at < planes.size; at += hn::Lanes(tag)) {
-    const Point a = load_point(planes.points, at), b = load_point(planes.points + 3, at),
-                c = load_point(planes.points + 6, at), d = load_point(planes.points + 9, at);
+    const Point a = load_point(planes, 0, at), b = load_point(planes, 1, at),
+                c = load_point(planes, 2, at), d = load_point(planes, 3, at);
     const Point u = minus(b, a), v = minus(d, c), w = minus(a, c);
     const Values uu = squared(u), uv = dot(u, v), vv = squared(v), uw = dot(u, w), vw = dot(v, w),
                  both = hn::Mul(uu, vv), sine = hn::NegMulAdd(uv, uv, both);
@@ -95,6 +128,43 @@ void solve_edges(const PairBatch::Planes& planes) {
   }
 }
 
+// Of all particles of the one side to all of the other. Summed in the order of Eigen's vectors.
+template <std::size_t kEnds, class Of>
+HWY_INLINE Values farthest(const Of& motion) {
+  const Point each[] = {motion(0), motion(1), motion(2), motion(3)};
+  Values most = of(0);
+  for (std::size_t m = 0; m < kEnds; ++m)
+    for (std::size_t n = kEnds; n < 4; ++n) {
+      const Point by = minus(each[m], each[n]);
+      const Values squared_by =
+          hn::Add(hn::Add(hn::Mul(by.x, by.x), hn::Mul(by.z, by.z)), hn::Mul(by.y, by.y));
+      most = hn::IfThenElse(hn::Gt(squared_by, most), squared_by, most);
+    }
+  return most;
+}
+
+template <std::size_t kEnds>
+HWY_INLINE void find_farthest_of(const PairBatch::Motions& motions) {
+  const PairTag d;
+  for (std::size_t at = 0; at < motions.size; at += hn::Lanes(d)) {
+    const auto farthest_of = [&](Eigen::Vector4d Mover::*motion) HWY_ATTR {
+      return farthest<kEnds>([&](std::size_t n) HWY_ATTR {
+        return load_point([&](std::size_t k) {
+          return (motions.movers[motions.particles[at + k][n]].*motion).data();
+        });
+      });
+    };
+    hn::Store(farthest_of(&Mover::way), d, motions.way + at);
+    hn::Store(farthest_of(&Mover::in_step), d, motions.in_step + at);
+  }
+}
+void find_farthest(const PairBatch::Motions& motions) {
+  if (motions.edges)
+    find_farthest_of<2>(motions);
+  else
+    find_farthest_of<1>(motions);
+}
+
 }  // namespace weft::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -103,9 +173,28 @@ namespace weft {
 
 HWY_EXPORT(solve_corners);
 HWY_EXPORT(solve_edges);
+HWY_EXPORT(find_farthest);
 
-void PairBatch::solve_corners() { HWY_DYNAMIC_DISPATCH(solve_corners)(planes()); }
-void PairBatch::solve_edges() { HWY_DYNAMIC_DISPATCH(solve_edges)(planes()); }
+void PairBatch::solve() {
+  const Planes planes{x_, particles_.data(), weights_, apart_, squared_, size_};
+  if (edges_)
+    HWY_DYNAMIC_DISPATCH(solve_edges)(planes);
+  else
+    HWY_DYNAMIC_DISPATCH(solve_corners)(planes);
+}
+
+void PairBatch::find_near(std::span<const Mover> movers) {
+  near_size_ = 0;
+  // without branches, which nothing foretells
+  for (std::size_t k = 0; k < size_; ++k) {
+    near_[near_size_] = k;
+    near_particles_[near_size_] = particles_[k];
+    const bool is_near = (squared_[k] < within_[k] * within_[k]) & (squared_[k] > 0);
+    near_size_ += is_near ? 1 : 0;
+  }
+  HWY_DYNAMIC_DISPATCH(find_farthest)
+  ({edges_, movers.data(), near_particles_.data(), squared_way_, squared_in_step_, near_size_});
+}
 
 }  // namespace weft
 #endif

@@ -2,8 +2,11 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
+#include <span>
 
-#include "core/model/shape.h"
+#include "core/cloth_contact/contact.h"
+#include "core/model/mesh.h"
 
 namespace weft {
 
@@ -13,25 +16,22 @@ class PairBatch {
  public:
   static constexpr std::size_t kMost = 64;
 
+  // Of particles at x, (3 x particles) m, which outlives it.
+  PairBatch(bool edges, const Matrix3Xd& x) : edges_(edges), x_(x.data()) {}
+
   bool full() const { return size_ == kMost; }
   std::size_t size() const { return size_; }
   void clear() { size_ = 0; }
-  // A particle and the corners of a triangle, or the ends of two edges, m. Precondition: not full.
-  void add(const Vector3d& a, const Vector3d& b, const Vector3d& c, const Vector3d& d) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto k = static_cast<Eigen::Index>(axis);
-      points_[axis][size_] = a[k];
-      points_[3 + axis][size_] = b[k];
-      points_[6 + axis][size_] = c[k];
-      points_[9 + axis][size_] = d[k];
-    }
-    ++size_;
+  // A particle and the corners of a triangle, or the ends of two edges; within: how near is near,
+  // m. Precondition: not full.
+  void add(const std::array<int, 4>& particles,
+           double within = std::numeric_limits<double>::infinity()) {
+    within_[size_] = within;
+    particles_[size_++] = particles;
   }
 
   // As nearest_in_triangle() and nearest_on_edges(), of all that were added.
-  void solve_corners();
-  void solve_edges();
-
+  void solve();
   // Of a pair: weights that lead from the second one's nearest point to the first one's; the way
   // between these, m; its squared length, m^2.
   std::array<double, 4> weights(std::size_t k) const {
@@ -40,23 +40,43 @@ class PairBatch {
   Vector3d apart(std::size_t k) const { return {apart_[0][k], apart_[1][k], apart_[2][k]}; }
   double squared(std::size_t k) const { return squared_[k]; }
 
+  // Finds which are near, but do not touch, and how far all particles of the one side of each move
+  // from all of the other at most.
+  void find_near(std::span<const Mover> movers);
+  std::size_t near_size() const { return near_size_; }
+  // Of the n-th: which it is; squared, m^2.
+  std::size_t near(std::size_t n) const { return near_[n]; }
+  double squared_way(std::size_t n) const { return squared_way_[n]; }
+  double squared_in_step(std::size_t n) const { return squared_in_step_[n]; }
+
   // Of vectors: kMost values each.
   struct Planes {
-    const double (*points)[kMost];
+    const double* x;
+    const std::array<int, 4>* particles;
     double (*weights)[kMost];
     double (*apart)[kMost];
     double* squared;
     std::size_t size;
   };
+  struct Motions {
+    bool edges;
+    const Mover* movers;
+    const std::array<int, 4>* particles;
+    double *way, *in_step;
+    std::size_t size;
+  };
 
  private:
-  Planes planes() { return {points_, weights_, apart_, squared_, size_}; }
-
-  std::size_t size_ = 0;
-  alignas(64) double points_[12][kMost] = {};
+  bool edges_;
+  const double* x_;
+  std::size_t size_ = 0, near_size_ = 0;
+  std::array<std::array<int, 4>, kMost> particles_ = {}, near_particles_ = {};
+  std::array<double, kMost> within_;
+  std::array<std::size_t, kMost> near_;
   alignas(64) double weights_[4][kMost];
   alignas(64) double apart_[3][kMost];
   alignas(64) double squared_[kMost];
+  alignas(64) double squared_way_[kMost], squared_in_step_[kMost];
 };
 
 }  // namespace weft

@@ -281,6 +281,7 @@ void PairLists::renew(const Matrix3Xd& x, double least, double reach, Scratch& s
   if (list.made_at.cols() > 0) state.left = list.reach - change(x, state.blocks, list, scratch.now);
   if (state.left >= least) return;
   constexpr int kMostBent = 7;
+  constexpr double kBeyondJoined = 0.3, kBeyond = 1.4;
   list = {};
   state.has_some = state.is_near = false;
   state.near_left = -1;
@@ -294,10 +295,13 @@ void PairLists::renew(const Matrix3Xd& x, double least, double reach, Scratch& s
     state.bent = state.bent_for;
   }
   if (state.left >= least) return;
-  state.left = list.reach = reach;
+  // what is joined is never farther apart
+  list.reach =
+      reach + (blocks_.are_joined(state.blocks) ? kBeyondJoined : kBeyond) * cloth_.thickest;
+  list.all = candidates_of(
+      cloth_, find_pairs(cloth_, blocks_, state.blocks, x, reach, list.reach, scratch.search));
+  state.left = list.reach;
   place(x, state.blocks, list.made_at);
-  list.all =
-      candidates_of(cloth_, find_pairs(cloth_, blocks_, state.blocks, x, reach, scratch.search));
   state.has_some = !list.all.empty();
 }
 

@@ -49,17 +49,12 @@ std::array<int, 4> particles_of_edges(const Cloth& cloth, const ClothPair& pair)
 template <class Pair, class Particles, class F>
 void for_each_distance(bool edges, const std::vector<Pair>& pairs, const Particles& particles,
                        const Matrix3Xd& x, const F& f) {
-  PairBatch batch;
+  PairBatch batch(edges, x);
   for (std::size_t begin = 0; begin < pairs.size(); begin += batch.size()) {
     batch.clear();
-    for (std::size_t n = begin; n < pairs.size() && !batch.full(); ++n) {
-      const auto [i, j, k, l] = particles(pairs[n]);
-      batch.add(x.col(i), x.col(j), x.col(k), x.col(l));
-    }
-    if (edges)
-      batch.solve_edges();
-    else
-      batch.solve_corners();
+    for (std::size_t n = begin; n < pairs.size() && !batch.full(); ++n)
+      batch.add(particles(pairs[n]));
+    batch.solve();
     for (std::size_t n = 0; n < batch.size(); ++n) f(pairs[begin + n], batch.squared(n));
   }
 }
@@ -169,9 +164,10 @@ std::map<BlockPair, ClothPairs> all_pairs(const Cloth& cloth) {
 }
 
 ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
-                      const Matrix3Xd& x, double reach, NearBlocks::Search& search) {
+                      const Matrix3Xd& x, double reach, double& reach_of_others,
+                      NearBlocks::Search& search) {
   ClothPairs some, found;
-  const double boxes_within = cloth.thickest + reach;
+  const double boxes_within = cloth.thickest + reach_of_others;
   const auto add_corners = [&](int one, int other) {
     for (const ClothPair& pair : near.near_corners(one, other, boxes_within, search))
       if (!has(corners_of(cloth, pair.second), pair.first)) some.corners.push_back(pair);
@@ -181,18 +177,24 @@ ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blo
   for (const ClothPair& pair : near.near_edges(blocks, boxes_within, search))
     if (!share_end(ends_of(cloth, pair.first), ends_of(cloth, pair.second)))
       some.edges.push_back(pair);
+  const auto keep = [&](const ClothPair& pair, double squared, double thickness,
+                        std::vector<ClothPair>& kept) {
+    const double within = thickness + reach, others = thickness + reach_of_others;
+    if (within > 0 && squared < within * within)
+      kept.push_back(pair);
+    else if (squared < others * others)
+      reach_of_others = std::sqrt(squared) - thickness;
+  };
   for_each_distance(
       false, some.corners, [&](const ClothPair& pair) { return particles_of_corner(cloth, pair); },
       x,
       [&](const ClothPair& pair, double squared) {
-        const double within = thickness_of_corner(cloth, pair.first, pair.second) + reach;
-        if (within > 0 && squared < within * within) found.corners.push_back(pair);
+        keep(pair, squared, thickness_of_corner(cloth, pair.first, pair.second), found.corners);
       });
   for_each_distance(
       true, some.edges, [&](const ClothPair& pair) { return particles_of_edges(cloth, pair); }, x,
       [&](const ClothPair& pair, double squared) {
-        const double within = thickness_of_edges(cloth, pair.first, pair.second) + reach;
-        if (within > 0 && squared < within * within) found.edges.push_back(pair);
+        keep(pair, squared, thickness_of_edges(cloth, pair.first, pair.second), found.edges);
       });
   std::sort(found.corners.begin(), found.corners.end());
   std::sort(found.edges.begin(), found.edges.end());

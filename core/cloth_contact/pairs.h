@@ -47,8 +47,10 @@ bool near_edges(const Cloth& cloth, const Matrix3Xd& x, int one, int other, doub
 std::map<BlockPair, ClothPairs> all_pairs(const Cloth& cloth);
 
 // Those between two blocks, at x where `near` has its boxes, that are nearer to each other than
-// their thickness and `reach`, m.
+// their thickness and `reach`, m; lowers `reach_of_others`, from `reach` on, to what keeps the
+// others so, m.
 ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
-                      const Matrix3Xd& x, double reach, NearBlocks::Search& search);
+                      const Matrix3Xd& x, double reach, double& reach_of_others,
+                      NearBlocks::Search& search);
 
 }  // namespace weft

@@ -6,17 +6,13 @@
 #include <span>
 #include <vector>
 
+#include "core/cloth_contact/contact.h"
+#include "core/cloth_contact/pair_batch.h"
 #include "core/cloth_contact/pairs.h"
 #include "core/cloth_contact/untangling.h"
 #include "core/motion/thread_pool.h"
 
 namespace weft {
-
-// A particle on its way. Fourth components are 0.
-struct Mover {
-  Eigen::Vector4d way;      // that it has come since contact acted last, m
-  Eigen::Vector4d in_step;  // displacement of the step to come, m
-};
 
 // Candidates that may come near each other.
 struct NearCloth {
@@ -65,29 +61,10 @@ class Separation {
   void forget_given();
 
  private:
-  // Of a pair's motion: along its normal, at least 0; by friction.
-  struct Change {
-    double along = 0;
-    Eigen::Vector4d sliding = Eigen::Vector4d::Zero();
-  };
-  // Weights lead from the second one's nearest point to the first one's; shares are what particles
-  // have of the pair's motion.
-  struct alignas(64) Contact {
-    std::array<int, 4> particle = {};
-    std::array<double, 4> weight = {};
-    int looked_at = -2;  // when
-    bool edges = false;
-    double room = 0;  // to its thickness, where it set out, m
-    std::array<double, 4> share = {};
-    Eigen::Vector4d normal = {};
-    double thickness = 0, friction = 0;  // m, 1
-    double most_given = 0;               // along the normal, m
-    Change way = {}, in_step = {};       // that it has given, m
-  };
   struct Given {
     std::array<int, 4> particle;
     bool edges;
-    Change way, in_step;
+    Contact::Change way, in_step;
   };
   struct Surroundings {
     const Untangling& untangling;
@@ -102,19 +79,13 @@ class Separation {
 
   static void touch(bool edges, std::span<const NearCloth> near, const Surroundings& around,
                     Found& found);
-  static void add(bool edges, const Candidate& candidate, const std::array<double, 4>& weight,
-                  const Vector3d& apart, double distance, double friction,
-                  const Surroundings& around, Found& found);
+  static void add(bool edges, const Candidate& candidate, double friction, const PairBatch& batch,
+                  std::size_t near, const Surroundings& around, Found& found);
   void set_out(const Ways& ways, ThreadPool& pool);
   template <class F>
   void for_each_contact(const F& f) {
     for (Found& found : found_) std::ranges::for_each(found.contacts, f);
   }
-  static Eigen::Vector4d give(const Eigen::Vector4d& motion, const Eigen::Vector4d& normal,
-                              double least, double friction, double free, Change& given);
-  void move(const Contact& contact, const Eigen::Vector4d& way, const Eigen::Vector4d& in_step);
-  double separate(double steps, Contact& contact);
-  void give_up(Contact& contact);
   std::size_t find_given(const Contact& contact, std::size_t next) const;
   void keep_given();
 

@@ -70,7 +70,8 @@ std::optional<Warning> find_tangles(const Scene& scene, const std::vector<Matrix
   NearBlocks::Search search;
   for (const BlockPair& each : blocks.meet(cloth.thickest)) {
     if (blocks.distance(each) > cloth.thickest) continue;
-    const ClothPairs found = find_pairs(cloth, blocks, each, all, -kRounding, search);
+    double others = -kRounding;
+    const ClothPairs found = find_pairs(cloth, blocks, each, all, -kRounding, others, search);
     near.corners.insert(near.corners.end(), found.corners.begin(), found.corners.end());
     near.edges.insert(near.edges.end(), found.edges.begin(), found.edges.end());
   }

@@ -113,7 +113,7 @@ Scene around_pole_and_band() {
   return scene;
 }
 
-std::int64_t cuts_of(const Simulation& simulation) {
+std::int64_t counted_cuts(const Simulation& simulation) {
   const std::vector<SheetDefinition>& sheets = simulation.scene().sheets;
   const Matrix3Xd x = positions(simulation);
   const int first = sheets[0].particle_count();
@@ -351,7 +351,7 @@ TEST(Dressing, WhatReachesFromPanelToPanelIsNotDrawnThroughABodyByForce) {
 TEST(Dressing, WhatReachesFromPanelToPanelIsNotDrawnThroughCloth) {
   Simulation simulation(around_pole_and_band());
   for (int frame = 0; frame < 90; ++frame) {
-    ASSERT_EQ(cuts_of(simulation), 0) << "frame " << frame;
+    ASSERT_EQ(counted_cuts(simulation), 0) << "frame " << frame;
     dress(simulation, 1);
   }
 }

@@ -57,13 +57,17 @@ TEST(NearBlocks, HaveEveryPairWithinReach) {
       for (const double reach : {0.0, 1e-3, 4e-3}) {
         SCOPED_TRACE(::testing::Message() << turns << " turns, reach " << reach);
         const Matrix3Xd x = rolled(sheet, turns, 3e-4);
-        std::vector<ClothPairs> expected;
-        for (const auto& [blocks, list] : all) {
+        const auto within = [&](const ClothPairs& list, double most_apart) {
           ClothPairs some;
           for (const auto& [i, t] : list.corners)
-            if (near_corner(cloth, x, i, t, reach)) some.corners.push_back({i, t});
+            if (near_corner(cloth, x, i, t, most_apart)) some.corners.push_back({i, t});
           for (const auto& [e, f] : list.edges)
-            if (near_edges(cloth, x, e, f, reach)) some.edges.push_back({e, f});
+            if (near_edges(cloth, x, e, f, most_apart)) some.edges.push_back({e, f});
+          return some;
+        };
+        std::vector<ClothPairs> expected;
+        for (const auto& [blocks, list] : all) {
+          const ClothPairs some = within(list, reach);
           if (!some.empty()) expected.push_back(some);
         }
         std::vector<ClothPairs> found;
@@ -71,8 +75,14 @@ TEST(NearBlocks, HaveEveryPairWithinReach) {
         NearBlocks::Search search;
         for (const BlockPair& blocks : near.meet(thickest + reach)) {
           if (near.distance(blocks) > thickest + reach) continue;
-          const ClothPairs some = find_pairs(cloth, near, blocks, x, reach, search);
+          double others = reach + 2e-3;
+          const ClothPairs some = find_pairs(cloth, near, blocks, x, reach, others, search);
           if (!some.empty()) found.push_back(some);
+          EXPECT_GE(others, reach);
+          EXPECT_TRUE(within(all.at(blocks), others - 1e-9) == some);
+          if (others < reach + 2e-3) {
+            EXPECT_FALSE(within(all.at(blocks), others + 1e-9) == some);
+          }
         }
         EXPECT_TRUE(found == expected) << size(found) << " of " << size(expected);
         most = std::max(most, size(expected));

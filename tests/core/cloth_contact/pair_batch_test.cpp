@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <vector>
+
 #include "core/contact/nearest.h"
 #include "tests/support/core/scenes.h"
 
@@ -21,13 +24,12 @@ Matrix3Xd points_of_pairs(int pairs) {
 
 // Of all pairs the greatest distance between ways that the batch and the plain function find; where
 // several are shortest, lengths count.
-template <class Solve, class Plain>
-double difference(std::size_t size, const Solve& solve, const Plain& plain) {
+template <class Plain>
+double difference(std::size_t size, bool edges, const Plain& plain) {
   const Matrix3Xd x = points_of_pairs(static_cast<int>(size));
-  PairBatch batch;
-  for (Eigen::Index k = 0; k < x.cols(); k += 4)
-    batch.add(x.col(k), x.col(k + 1), x.col(k + 2), x.col(k + 3));
-  solve(batch);
+  PairBatch batch(edges, x);
+  for (int k = 0; k < x.cols(); k += 4) batch.add({k, k + 1, k + 2, k + 3});
+  batch.solve();
   double most = 0;
   for (std::size_t k = 0; k < size; ++k) {
     const Eigen::Index at = 4 * static_cast<Eigen::Index>(k);
@@ -43,24 +45,61 @@ double difference(std::size_t size, const Solve& solve, const Plain& plain) {
 
 TEST(PairBatch, FindsTheNearestPointsThatThePlainFunctionsFind) {
   for (const std::size_t size : {std::size_t{1}, std::size_t{5}, PairBatch::kMost}) {
-    EXPECT_LT(difference(
-                  size, [](PairBatch& batch) { batch.solve_corners(); },
-                  [](const Matrix3Xd& x, Eigen::Index at) {
-                    const Vector3d p = x.col(at), a = x.col(at + 1), b = x.col(at + 2),
-                                   c = x.col(at + 3);
-                    const auto [u, v, w] = nearest_in_triangle(p, a, b, c);
-                    return (p - u * a - v * b - w * c).norm();
-                  }),
+    EXPECT_LT(difference(size, false,
+                         [](const Matrix3Xd& x, Eigen::Index at) {
+                           const Vector3d p = x.col(at), a = x.col(at + 1), b = x.col(at + 2),
+                                          c = x.col(at + 3);
+                           const auto [u, v, w] = nearest_in_triangle(p, a, b, c);
+                           return (p - u * a - v * b - w * c).norm();
+                         }),
               1e-12);
-    EXPECT_LT(difference(
-                  size, [](PairBatch& batch) { batch.solve_edges(); },
-                  [](const Matrix3Xd& x, Eigen::Index at) {
-                    const Vector3d a = x.col(at), b = x.col(at + 1), c = x.col(at + 2),
-                                   d = x.col(at + 3);
-                    const auto [s, t] = nearest_on_edges(a, b, c, d);
-                    return (a + s * (b - a) - c - t * (d - c)).norm();
-                  }),
+    EXPECT_LT(difference(size, true,
+                         [](const Matrix3Xd& x, Eigen::Index at) {
+                           const Vector3d a = x.col(at), b = x.col(at + 1), c = x.col(at + 2),
+                                          d = x.col(at + 3);
+                           const auto [s, t] = nearest_on_edges(a, b, c, d);
+                           return (a + s * (b - a) - c - t * (d - c)).norm();
+                         }),
               1e-12);
+  }
+}
+
+TEST(PairBatch, FindsWhatIsNearAndHowFarItsSidesCameFromEachOther) {
+  const auto size = static_cast<int>(PairBatch::kMost);
+  const Matrix3Xd x = points_of_pairs(size), ways = noise(4 * size, 5), steps = noise(4 * size, 7);
+  std::vector<Mover> movers;
+  for (Eigen::Index i = 0; i < x.cols(); ++i) {
+    Mover& mover = movers.emplace_back();
+    mover.way << ways.col(i), 0;
+    mover.in_step << steps.col(i), 0;
+  }
+  for (const bool edges : {false, true}) {
+    PairBatch batch(edges, x);
+    const auto within = [](int pair) { return 0.1 * (pair % 8); };
+    for (int k = 0; k < size; ++k) batch.add({4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3}, within(k));
+    batch.solve();
+    batch.find_near(movers);
+    std::vector<std::size_t> near, wanted;
+    for (std::size_t n = 0; n < batch.near_size(); ++n) near.push_back(batch.near(n));
+    for (std::size_t k = 0; k < batch.size(); ++k) {
+      const double distance = std::sqrt(batch.squared(k));
+      if (distance > 0 && distance < within(static_cast<int>(k))) wanted.push_back(k);
+    }
+    EXPECT_EQ(near, wanted);
+    EXPECT_GT(near.size(), 0);
+    EXPECT_LT(near.size(), batch.size());
+    const Eigen::Index ends = edges ? 2 : 1;
+    for (std::size_t n = 0; n < batch.near_size(); ++n) {
+      const Eigen::Index first = 4 * static_cast<Eigen::Index>(batch.near(n));
+      double way = 0, in_step = 0;
+      for (Eigen::Index i = first; i < first + ends; ++i)
+        for (Eigen::Index j = first + ends; j < first + 4; ++j) {
+          way = std::max(way, (ways.col(i) - ways.col(j)).squaredNorm());
+          in_step = std::max(in_step, (steps.col(i) - steps.col(j)).squaredNorm());
+        }
+      EXPECT_NEAR(batch.squared_way(n), way, 1e-15);
+      EXPECT_NEAR(batch.squared_in_step(n), in_step, 1e-15);
+    }
   }
 }
 

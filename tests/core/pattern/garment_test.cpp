@@ -42,7 +42,7 @@ double flat_area(const TriangleMesh& mesh) {
 }
 
 // Closed lines of edges of one triangle.
-int borders_of(const TriangleMesh& mesh) {
+int count_borders(const TriangleMesh& mesh) {
   std::map<int, std::vector<int>> next;
   for (const auto& [edge, count] : edges_of(mesh))
     if (count == 1)
@@ -94,7 +94,7 @@ TEST(Garments, TwoHalfDiscsSewnAreADisc) {
                   {seam({"right", 1}, {"left", 1})}};
   const Garment sewn = built(pattern, edge);
   EXPECT_EQ(euler_number(sewn.mesh), 1);
-  EXPECT_EQ(borders_of(sewn.mesh), 1);
+  EXPECT_EQ(count_borders(sewn.mesh), 1);
   EXPECT_EQ(sewn.edges[1].particles.size(), sewn.edges[3].particles.size());
   EXPECT_TRUE(std::equal(sewn.edges[1].particles.begin(), sewn.edges[1].particles.end(),
                          sewn.edges[3].particles.rbegin()));
@@ -116,7 +116,7 @@ TEST(Garments, ARectangleSewnToItselfIsATubeAtEveryWidth) {
     const Garment tube =
         built({{rectangle("tube", width, 0.2)}, {seam({"tube", 1}, {"tube", 3})}}, 0.01);
     EXPECT_EQ(euler_number(tube.mesh), 0) << width;
-    EXPECT_EQ(borders_of(tube.mesh), 2) << width;
+    EXPECT_EQ(count_borders(tube.mesh), 2) << width;
     EXPECT_NEAR(flat_area(tube.mesh), 0.2 * width, 1e-12);
   }
 }
@@ -127,7 +127,7 @@ TEST(Garments, ABagIsClosedButForItsMouth) {
                                {{"back", 3}, {"back", 0}, {"back", 1}},
                                true}}},
                             0.02);
-  EXPECT_EQ(borders_of(bag.mesh), 1);
+  EXPECT_EQ(count_borders(bag.mesh), 1);
   EXPECT_EQ(euler_number(bag.mesh), 1);
 }
 
@@ -208,7 +208,7 @@ TEST(Garments, ADartIsANotchWhoseSidesAreSewn) {
                       line_to(0.1, 0.2), line_to(0.09, 0.3), line_to(0, 0.3), line_to(0, 0)});
   const Garment garment = built({{front}, {seam({"front", 3}, {"front", 4})}}, 0.01);
   EXPECT_EQ(euler_number(garment.mesh), 1);
-  EXPECT_EQ(borders_of(garment.mesh), 1);
+  EXPECT_EQ(count_borders(garment.mesh), 1);
   EXPECT_EQ(garment.edges[3].particles.front(), garment.edges[4].particles.back());
 }
 
@@ -320,7 +320,7 @@ TEST(Garments, PanelsThatSeamsTurnOverAreMirrored) {
   const Garment garment = built(pattern, 0.02);
   ASSERT_EQ(codes(garment), std::set<std::string>{"PANEL_TURNED"});
   EXPECT_EQ(garment.notes[0].field, "pattern.panels[1]");
-  EXPECT_EQ(borders_of(garment.mesh), 1);
+  EXPECT_EQ(count_borders(garment.mesh), 1);
   // both start where the pattern has them
   for (const Vector3d& place : garment.mesh.start) EXPECT_GE(place.x(), -1e-12);
   // a band sewn to itself face to back has one side

@@ -12,78 +12,11 @@
 #include "core/triangles/triangles.h"
 #include "core/verdict.h"
 #include "tests/support/core/scenes.h"
+#include "tests/support/core/sewn_tube.h"
 #include "tests/support/core/wrapped_solver.h"
 
 namespace weft::testing {
 namespace {
-
-constexpr int kTubeColumns = 20, kTubeRows = 10;
-constexpr double kPanelWidth = 0.2, kPanelHeight = 0.1;  // of a panel, m
-constexpr double kPanelsApart = 0.08;                    // of a panel from the middle, m
-
-// Two rectangles on both sides of x = y = 0, sewn along their sides to a tube about y. Particles on
-// the seams lie between the panels.
-TriangleMesh sewn_tube() {
-  TriangleMesh mesh;
-  const auto particle = [](int side, int row, int column) {
-    if (column == 0 || column == kTubeColumns) side = 0;
-    const int inner = (kTubeRows + 1) * (kTubeColumns + 1);
-    return side == 0 ? row * (kTubeColumns + 1) + column
-                     : inner + row * (kTubeColumns - 1) + column - 1;
-  };
-  mesh.start.resize(static_cast<std::size_t>((kTubeRows + 1) * 2 * kTubeColumns));
-  for (int side = 0; side < 2; ++side) {
-    const int first = static_cast<int>(mesh.flat.size());
-    for (int row = 0; row <= kTubeRows; ++row)
-      for (int column = 0; column <= kTubeColumns; ++column) {
-        const double u = kPanelWidth * column / kTubeColumns, v = kPanelHeight * row / kTubeRows;
-        const bool sewn = column == 0 || column == kTubeColumns;
-        mesh.start[static_cast<std::size_t>(particle(side, row, column))] =
-            Vector3d(u - kPanelWidth / 2, v,
-                     sewn        ? 0
-                     : side == 0 ? kPanelsApart
-                                 : -kPanelsApart);
-        mesh.flat.emplace_back(side == 0 ? u : 1 - u, v);
-      }
-    for (int row = 0; row < kTubeRows; ++row)
-      for (int column = 0; column < kTubeColumns; ++column)
-        for (const bool upper : {false, true}) {
-          const auto corner = [&](int r, int c) { return std::pair(row + r, column + c); };
-          std::array corners = upper ? std::array{corner(0, 0), corner(1, 1), corner(1, 0)}
-                                     : std::array{corner(0, 0), corner(0, 1), corner(1, 1)};
-          if (side == 1) std::swap(corners[1], corners[2]);
-          auto& triangle = mesh.triangles.emplace_back();
-          auto& flat = mesh.flat_triangles.emplace_back();
-          for (std::size_t k = 0; k < 3; ++k) {
-            triangle[k] = particle(side, corners[k].first, corners[k].second);
-            flat[k] = first + corners[k].first * (kTubeColumns + 1) + corners[k].second;
-          }
-        }
-    mesh.panels.push_back({side == 0 ? "front" : "back", 2 * kTubeRows * kTubeColumns, 0});
-  }
-  return mesh;
-}
-
-// The tube, to be put around a pole.
-Scene around_pole(double radius) {
-  SheetDefinition sheet;
-  sheet.name = "tube";
-  sheet.shape = complete(sewn_tube());
-  sheet.textile.model = MeasuredTextile{.areal_density = 0.15,
-                                        .tensile_warp = 200,
-                                        .tensile_weft = 200,
-                                        .shear = 20,
-                                        .bend_rigidity_warp = 1e-5,
-                                        .bend_rigidity_weft = 1e-5};
-  sheet.textile.friction = 0;
-  sheet.bending = Isometric{};
-  sheet.skin = 0.001;
-  Scene scene;
-  scene.sheets = {sheet};
-  scene.colliders = {{"pole", Capsule{Vector3d(0, -1, 0), Vector3d(0, 1, 0), radius}, 0, {}}};
-  scene.dressing.emplace();
-  return scene;
-}
 
 // The same beside a bar that the edges from panel to panel start through, but no particle is in.
 constexpr double kBar = 0.01;  // its radius, m
@@ -120,25 +53,7 @@ std::int64_t counted_cuts(const Simulation& simulation) {
   return count_cuts(sheets, {x.leftCols(first), x.rightCols(x.cols() - first)}).count;
 }
 
-void dress(Simulation& simulation, int frames) {
-  for (int i = 0; i < frames; ++i) ASSERT_TRUE(simulation.advance_frame()) << simulation.failure();
-}
-
 double mean_height(const Simulation& simulation) { return positions(simulation).row(1).mean(); }
-
-// Around the tube at a row, m.
-double girth(const Simulation& simulation, int row) {
-  const Matrix3Xd x = positions(simulation);
-  const int inner = (kTubeRows + 1) * (kTubeColumns + 1);
-  std::vector<int> ring;
-  for (int c = 0; c <= kTubeColumns; ++c) ring.push_back(row * (kTubeColumns + 1) + c);
-  for (int c = kTubeColumns - 1; c > 0; --c)
-    ring.push_back(inner + row * (kTubeColumns - 1) + c - 1);
-  double sum = 0;
-  for (std::size_t k = 0; k < ring.size(); ++k)
-    sum += (x.col(ring[k]) - x.col(ring[(k + 1) % ring.size()])).norm();
-  return sum;
-}
 
 TEST(Dressing, StartsWithoutStrainAndEndsWithTheFlatShape) {
   const SheetDefinition sheet = around_pole(0.05).sheets[0];
@@ -235,71 +150,6 @@ TEST(Dressing, ATightGarmentPressesAsItsTensionOverTheRadius) {
   EXPECT_EQ(verdict.particles_inside, 0);
 }
 
-std::vector<std::string> codes(const Simulation& simulation) {
-  std::vector<std::string> all;
-  for (const Fault& fault : simulation.verdict().faults) all.push_back(fault.code);
-  return all;
-}
-
-TEST(Dressing, IsJudgedByWhatIsWrongWithIt) {
-  Scene scene = around_pole(0.075);  // 19 % too small
-  scene.environment.gravity = Vector3d::Zero();
-  Simulation tight(scene);
-  dress(tight, 1);
-  EXPECT_EQ(codes(tight), (std::vector<std::string>{"NOT_DRESSED", "NOT_AT_REST"}));
-  dress(tight, 150);
-  EXPECT_EQ(codes(tight), (std::vector<std::string>{"NOT_AT_REST", "TOO_TIGHT"}));
-
-  scene = around_pole(0.03);  // far too wide: it falls off
-  scene.dressing->holds = {{0, {0, 1, 2}, 0.3}};
-  Simulation wide(scene);
-  dress(wide, 150);
-  EXPECT_EQ(codes(wide), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN", "BESIDE_BODY"}));
-  EXPECT_THAT(wide.verdict().faults[1].message, ::testing::EndsWith("or too smooth"));
-  scene.solver.max_self_weight_strain = 0.01;
-  Simulation soft(scene);
-  dress(soft, 150);
-  EXPECT_THAT(soft.verdict().faults[1].message, ::testing::HasSubstr("its stretch capped"));
-
-  scene.solver.max_self_weight_strain.reset();
-  scene.dressing->holds.clear();
-  Simulation falling(scene);
-  dress(falling, 150);
-  EXPECT_EQ(codes(falling), (std::vector<std::string>{"NOT_AT_REST", "SLID_DOWN", "BESIDE_BODY"}));
-  EXPECT_THAT(falling.verdict().faults[1].message, ::testing::HasSubstr("nothing holds it up"));
-}
-
-TEST(Dressing, ATubeThatClosesBesideAPoleIsBesideIt) {
-  Scene scene = around_pole(0.05);
-  scene.environment.gravity = Vector3d::Zero();
-  std::get<Capsule>(scene.colliders[0].shape) = {Vector3d(0.3, -1, 0), Vector3d(0.3, 1, 0), 0.05};
-  Simulation simulation(scene);
-  dress(simulation, 1);
-  EXPECT_EQ(codes(simulation), (std::vector<std::string>{"NOT_DRESSED", "NOT_AT_REST"}));
-  dress(simulation, 150);
-  EXPECT_EQ(codes(simulation), (std::vector<std::string>{"NOT_AT_REST", "BESIDE_BODY"}));
-  EXPECT_THAT(simulation.verdict().faults[1].message,
-              ::testing::AllOf(::testing::StartsWith("2 borders go around no part of a body"),
-                               ::testing::HasSubstr(" mm in panel \"")));
-}
-
-TEST(Dressing, KnitsFitWhereWovensAreTooTight) {
-  const auto fault_of = [](double tensile, double radius) {
-    Scene scene = around_pole(radius);
-    scene.environment.gravity = Vector3d::Zero();
-    auto& textile = std::get<MeasuredTextile>(scene.sheets[0].textile.model);
-    textile.tensile_warp = textile.tensile_weft = tensile;
-    Simulation simulation(scene);
-    dress(simulation, 150);
-    const auto faults = simulation.verdict().faults;
-    const auto tight = std::ranges::find(faults, "TOO_TIGHT", &Fault::code);
-    return tight == faults.end() ? "" : tight->message;
-  };
-  EXPECT_EQ(fault_of(60, 0.075), "");  // stretched by a fifth
-  EXPECT_THAT(fault_of(1000, 0.075), ::testing::HasSubstr("more than 10 %"));
-  EXPECT_THAT(fault_of(60, 0.09), ::testing::HasSubstr("more than 30 %"));
-}
-
 // How near edges of the tube come to an upright axis, m.
 double distance_from_axis(const Vector3d& at, const Simulation& simulation) {
   const Matrix3Xd x = positions(simulation);
@@ -365,31 +215,6 @@ TEST(Dressing, NothingRubsWhileSeamsClose) {
   EXPECT_EQ(hash_of(positions(rubs)), hash_of(positions(slides)));
   for (Simulation* simulation : {&slides, &rubs}) dress(*simulation, 30);
   EXPECT_GT(mean_height(rubs), mean_height(slides) + 0.1);
-}
-
-// A triangle that is stretched by a fifth, and 200 that are not, of 1 % of its size together.
-TEST(Verdict, StrainIsOfTheClothHoweverItIsDividedIntoTriangles) {
-  Scene scene = around_pole(0.05);
-  scene.dressing.reset();
-  scene.colliders.clear();
-  SheetDefinition fine = scene.sheets[0];
-  fine.name = "fine";
-  fine.shape = Grid{11, 11, 0.001};
-  SheetDefinition coarse = scene.sheets[0];
-  coarse.name = "coarse";
-  TriangleMesh mesh;
-  mesh.flat = {{0, 0}, {0.2, 0}, {0, 0.1}};
-  mesh.start = {{1, 0, 0}, {1.24, 0, 0}, {1, 0.1, 0}};
-  mesh.triangles = {{0, 1, 2}};
-  mesh.panels = {{"sleeve", 1, 0}};
-  coarse.shape = complete(mesh);
-  scene.sheets = {fine, coarse};
-  const Verdict verdict = Simulation(scene).verdict();
-  EXPECT_NEAR(verdict.strain_weft, 0.2, 1e-6);
-  EXPECT_NEAR(verdict.strain_warp, 0, 1e-6);
-  ASSERT_EQ(verdict.faults.size(), 2U);
-  EXPECT_EQ(verdict.faults[1].code, "TOO_TIGHT");
-  EXPECT_NE(verdict.faults[1].message.find("panel \"sleeve\""), std::string::npos);
 }
 
 TEST(Dressing, WeightComesInOnceSeamsAreClosed) {

@@ -4,31 +4,30 @@
 namespace weft {
 namespace {
 
-// Writes the columns of a sheet into planes x, y, z of all sheets.
-void copy_planes(const Matrix3Xd& from, Eigen::Index first, std::span<double> out) {
+// Of all sheets, into planes x, y, z.
+void copy_planes(const std::vector<MovingSheet>& sheets, Matrix3Xd SheetState::*values,
+                 std::span<double> out) {
   const auto plane = static_cast<Eigen::Index>(out.size() / 3);
-  for (Eigen::Index axis = 0; axis < 3; ++axis)
-    Eigen::Map<Eigen::RowVectorXd>(out.data() + axis * plane + first, from.cols()) = from.row(axis);
+  Eigen::Index first = 0;
+  for (const MovingSheet& sheet : sheets) {
+    const Matrix3Xd& from = sheet.good().*values;
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      Eigen::Map<Eigen::RowVectorXd>(out.data() + axis * plane + first, from.cols()) =
+          from.row(axis);
+    first += from.cols();
+  }
 }
 
 }  // namespace
 
 void Simulation::copy_positions(std::span<double> out) const {
   state_->restore_memory();
-  Eigen::Index first = 0;
-  for (const MovingSheet& sheet : state_->sheets) {
-    copy_planes(sheet.good().x, first, out);
-    first += sheet.good().x.cols();
-  }
+  copy_planes(state_->sheets, &SheetState::x, out);
 }
 
 void Simulation::copy_velocities(std::span<double> out) const {
   state_->restore_memory();
-  Eigen::Index first = 0;
-  for (const MovingSheet& sheet : state_->sheets) {
-    copy_planes(sheet.good().v, first, out);
-    first += sheet.good().v.cols();
-  }
+  copy_planes(state_->sheets, &SheetState::v, out);
 }
 
 std::shared_ptr<const Scene> Simulation::scene_of_frame() const {

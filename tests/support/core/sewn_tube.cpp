@@ -11,7 +11,8 @@
 namespace weft::testing {
 
 TriangleMesh sewn_tube() {
-  constexpr double kPanelHeight = 0.1, kPanelsApart = 0.08;  // of a panel from the middle, m
+  constexpr double kPanelHeight = 0.1;   // m
+  constexpr double kPanelsApart = 0.08;  // of a panel from the middle, m
   TriangleMesh mesh;
   const auto particle = [](int side, int row, int column) {
     if (column == 0 || column == kTubeColumns) side = 0;

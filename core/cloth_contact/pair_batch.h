@@ -5,7 +5,7 @@
 #include <limits>
 #include <span>
 
-#include "core/cloth_contact/contact.h"
+#include "core/cloth_contact/pair_contact.h"
 #include "core/model/mesh.h"
 
 namespace weft {

@@ -106,7 +106,7 @@ void Separation::add(bool edges, const Candidate& candidate, double friction,
   if (const double in_step = batch.squared_in_step(near); in_step > 0)
     found.most_steps = std::min(found.most_steps, reach / std::sqrt(in_step));
 
-  Contact& contact = found.contacts.emplace_back();
+  PairContact& contact = found.contacts.emplace_back();
   contact.particle = candidate.particle;
   contact.edges = edges;
   contact.weight = weight;
@@ -133,16 +133,16 @@ void Separation::set_out(const Ways& ways, ThreadPool& pool) {
 }
 
 void Separation::separate(double steps) {
-  constexpr int kMostPasses = 12, kNever = -1;
-  changed_.assign(movers_.size(), kNever);
+  constexpr int kMostPasses = 12, kUnmoved = -1;
+  changed_.assign(movers_.size(), kUnmoved);
   const Movers movers{movers_, changed_};
   // what was given the last time
   std::size_t next = 0;  // most pairs come in the order in which they came then
-  for_each_contact([&](Contact& contact) {
+  for_each_contact([&](PairContact& contact) {
     const std::size_t found = find_given(contact, next);
     if (found == given_.size()) return;
     next = found + 1;
-    const auto turned = [&](const Contact::Change& change) -> Contact::Change {
+    const auto turned = [&](const PairContact::Change& change) -> PairContact::Change {
       return {change.along, change.sliding - change.sliding.dot(contact.normal) * contact.normal};
     };
     contact.way = turned(given_[found].way);
@@ -166,7 +166,7 @@ void Separation::forget_given() {
 
 void Separation::keep_given() {
   given_.clear();
-  for_each_contact([&](const Contact& contact) {
+  for_each_contact([&](const PairContact& contact) {
     if (contact.way.along > 0 || contact.in_step.along > 0)
       given_.push_back({contact.particle, contact.edges, contact.way, contact.in_step});
   });
@@ -179,7 +179,7 @@ void Separation::keep_given() {
 }
 
 // Its place in given_, or the size of that. First looks at `next`.
-std::size_t Separation::find_given(const Contact& contact, std::size_t next) const {
+std::size_t Separation::find_given(const PairContact& contact, std::size_t next) const {
   const auto is = [&](const Given& given) {
     return given.particle == contact.particle && given.edges == contact.edges;
   };

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/cloth_contact/contact.h"
 #include "core/cloth_contact/pair_batch.h"
+#include "core/cloth_contact/pair_contact.h"
 #include "core/cloth_contact/pairs.h"
 #include "core/cloth_contact/untangling.h"
 #include "core/motion/thread_pool.h"
@@ -64,7 +64,7 @@ class Separation {
   struct Given {
     std::array<int, 4> particle;
     bool edges;
-    Contact::Change way, in_step;
+    PairContact::Change way, in_step;
   };
   struct Surroundings {
     const Untangling& untangling;
@@ -73,7 +73,7 @@ class Separation {
     double most, layers;
   };
   struct Found {
-    std::vector<Contact> contacts;
+    std::vector<PairContact> contacts;
     double most_steps = 0;
   };
 
@@ -86,7 +86,7 @@ class Separation {
   void for_each_contact(const F& f) {
     for (Found& found : found_) std::ranges::for_each(found.contacts, f);
   }
-  std::size_t find_given(const Contact& contact, std::size_t next) const;
+  std::size_t find_given(const PairContact& contact, std::size_t next) const;
   void keep_given();
 
   std::vector<Given> given_;          // the last time, of pairs that gave something

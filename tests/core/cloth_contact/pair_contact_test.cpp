@@ -1,4 +1,4 @@
-#include "core/cloth_contact/contact.h"
+#include "core/cloth_contact/pair_contact.h"
 
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
@@ -10,7 +10,7 @@ namespace weft::testing {
 namespace {
 
 struct Heap {
-  std::vector<Contact> contacts;
+  std::vector<PairContact> contacts;
   std::vector<Mover> movers;
   std::vector<int> changed;
 };
@@ -28,7 +28,7 @@ Heap heap(int particles, int contacts) {
   made.changed.assign(static_cast<std::size_t>(particles), -1);
   for (int i = 0; i < particles; ++i) made.movers.push_back({1e-3 * vector(), 1e-4 * vector()});
   for (int k = 0; k < contacts; ++k) {
-    Contact& contact = made.contacts.emplace_back();
+    PairContact& contact = made.contacts.emplace_back();
     const int first = std::uniform_int_distribution(0, particles - 8)(random);
     contact.particle = {first, first + 2, first + 3, first + 7};
     contact.edges = k % 2 == 1;
@@ -55,7 +55,7 @@ void answer(Heap& heap, int passes) {
     answer(heap.contacts, 3, {heap.movers, heap.changed}, now);
 }
 
-Eigen::Vector4d motion_of(const Contact& contact, const Heap& heap,
+Eigen::Vector4d motion_of(const PairContact& contact, const Heap& heap,
                           Eigen::Vector4d Mover::*motion) {
   Eigen::Vector4d sum = Eigen::Vector4d::Zero();
   for (std::size_t n = 0; n < 4; ++n)
@@ -63,7 +63,7 @@ Eigen::Vector4d motion_of(const Contact& contact, const Heap& heap,
   return sum;
 }
 
-TEST(Contacts, AreAnsweredToTheSameBitsInVectorsAndOneByOne) {
+TEST(PairContacts, AreAnsweredToTheSameBitsInVectorsAndOneByOne) {
   const auto answered = [](std::int64_t target) {
     hwy::SetSupportedTargetsForTest(target);
     Heap made = heap(60, 200);
@@ -83,11 +83,11 @@ TEST(Contacts, AreAnsweredToTheSameBitsInVectorsAndOneByOne) {
   }
 }
 
-TEST(Contacts, EndNoNearerThanTheirThicknessNorComeNearerInTheStepsToCome) {
+TEST(PairContacts, EndNoNearerThanTheirThicknessNorComeNearerInTheStepsToCome) {
   Heap made = heap(2000, 60);
-  for (Contact& contact : made.contacts) contact.most_given = 1;
+  for (PairContact& contact : made.contacts) contact.most_given = 1;
   answer(made, 200);
-  for (const Contact& contact : made.contacts) {
+  for (const PairContact& contact : made.contacts) {
     const double come = motion_of(contact, made, &Mover::way).dot(contact.normal),
                  to_come = 3 * motion_of(contact, made, &Mover::in_step).dot(contact.normal);
     EXPECT_GE(come, -std::max(contact.room, 0.0) - 1e-6);
@@ -95,7 +95,7 @@ TEST(Contacts, EndNoNearerThanTheirThicknessNorComeNearerInTheStepsToCome) {
   }
 }
 
-TEST(Contacts, TakeFromOneSideWhatTheyGiveToTheOther) {
+TEST(PairContacts, TakeFromOneSideWhatTheyGiveToTheOther) {
   Heap made = heap(60, 200);
   const auto sum = [&](Eigen::Vector4d Mover::*motion) {
     Eigen::Vector4d all = Eigen::Vector4d::Zero();
@@ -110,14 +110,14 @@ TEST(Contacts, TakeFromOneSideWhatTheyGiveToTheOther) {
   EXPECT_LT((sum(&Mover::in_step) - in_step).norm(), 1e-15);
 }
 
-TEST(Contacts, ThatGiveMoreThanAnyThatSettlesTakeItBack) {
+TEST(PairContacts, ThatGiveMoreThanAnyThatSettlesTakeItBack) {
   Heap made = heap(60, 1);
-  Contact& contact = made.contacts[0];
+  PairContact& contact = made.contacts[0];
   contact.room = -1e-3;
   contact.most_given = 1e-5;
   const Heap before = made;
   answer(made, 12);
-  EXPECT_EQ(contact.looked_at, Contact::kNever);
+  EXPECT_EQ(contact.looked_at, PairContact::kNever);
   for (std::size_t i = 0; i < made.movers.size(); ++i) {
     EXPECT_LT((made.movers[i].way - before.movers[i].way).norm(), 1e-18);
     EXPECT_LT((made.movers[i].in_step - before.movers[i].in_step).norm(), 1e-18);

@@ -15,7 +15,7 @@ struct alignas(64) Mover {
 
 // Two nearest points of cloth that keep each other at a thickness: of a particle and a triangle, or
 // of two edges.
-struct alignas(64) Contact {
+struct alignas(64) PairContact {
   // Of the pair's motion: along its normal, at least 0; by friction.
   struct Change {
     double along = 0;
@@ -40,14 +40,14 @@ struct alignas(64) Contact {
 // All particles of a cloth.
 struct Movers {
   std::span<Mover> each;
-  std::span<int> changed;  // when; 0: by little, or before the first turn
+  std::span<int> changed;  // when; 0: by little, or before the first turn; less: never
 };
 
 // Moves the particles of a contact by what it has given.
-void give(const Contact& contact, const Movers& movers);
+void give(const PairContact& contact, const Movers& movers);
 // Answers contacts whose particles others have moved since they were looked at, one after the
 // other, for as many steps as are to come. now: counts those that moved theirs by what others must
 // answer.
-void answer(std::span<Contact> contacts, double steps, const Movers& movers, int& now);
+void answer(std::span<PairContact> contacts, double steps, const Movers& movers, int& now);
 
 }  // namespace weft

@@ -1,4 +1,4 @@
-#include "core/cloth_contact/contact.h"
+#include "core/cloth_contact/pair_contact.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 // compiled again for every target
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "core/cloth_contact/contact.cpp"
+#define HWY_TARGET_INCLUDE "core/cloth_contact/pair_contact.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -74,7 +74,7 @@ HWY_INLINE void add(const Four& by, Eigen::Vector4d& to) { store(plus(load(to), 
 // What a motion lacks to be at least `least` along the normal, and without sliding as far as
 // friction by what is given beyond `free` holds that; some of what was given may be taken back. m
 HWY_INLINE Four lacks(const Four& motion, double along, const Four& normal, double least,
-                      double friction, double free, Contact::Change& given) {
+                      double friction, double free, PairContact::Change& given) {
   const double before = given.along;
   given.along = std::max(before + least - along, 0.0);
   const Four slid = load(given.sliding);
@@ -86,7 +86,7 @@ HWY_INLINE Four lacks(const Four& motion, double along, const Four& normal, doub
   return minus(plus(times(normal, given.along - before), sliding), slid);
 }
 
-HWY_INLINE void move(const Contact& contact, const Four& way, const Four& in_step,
+HWY_INLINE void move(const PairContact& contact, const Four& way, const Four& in_step,
                      const Movers& movers) {
   for (std::size_t n = 0; n < 4; ++n) {
     const auto at = static_cast<std::size_t>(contact.particle[n]);
@@ -96,17 +96,18 @@ HWY_INLINE void move(const Contact& contact, const Four& way, const Four& in_ste
   }
 }
 
-void give_again(const Contact& contact, const Movers& movers) {
+// 1: gives it again; -1: takes it back.
+void give_times(double count, const PairContact& contact, const Movers& movers) {
   const Four normal = load(contact.normal);
-  const auto all = [&](const Contact::Change& given)
-                       HWY_ATTR { return plus(times(normal, given.along), load(given.sliding)); };
+  const auto all = [&](const PairContact::Change& given) HWY_ATTR {
+    return times(plus(times(normal, given.along), load(given.sliding)), count);
+  };
   move(contact, all(contact.way), all(contact.in_step), movers);
 }
 
 // Returns how far it was from what it is to be, m.
-HWY_INLINE double answer(Contact& contact, double steps, const Movers& movers) {
-  const Eigen::Vector4d zero = Eigen::Vector4d::Zero();
-  Four way = load(zero), in_step = way;
+HWY_INLINE double answer(PairContact& contact, double steps, const Movers& movers) {
+  Four way = load(Eigen::Vector4d::Zero()), in_step = way;
   for (std::size_t n = 0; n < 4; ++n) {
     const Mover& mover = movers.each[static_cast<std::size_t>(contact.particle[n])];
     way = plus(way, times(load(mover.way), contact.weight[n]));
@@ -132,8 +133,8 @@ HWY_INLINE double answer(Contact& contact, double steps, const Movers& movers) {
   return std::max(std::abs(pushed), std::abs(contact.in_step.along - braked_before) * steps);
 }
 
-void answer_all(std::span<Contact> contacts, double steps, const Movers& movers, int& now) {
-  for (Contact& contact : contacts) {
+void answer_all(std::span<PairContact> contacts, double steps, const Movers& movers, int& now) {
+  for (PairContact& contact : contacts) {
     int changed = 0;
     for (const int i : contact.particle)
       changed = std::max(changed, movers.changed[static_cast<std::size_t>(i)]);
@@ -141,19 +142,14 @@ void answer_all(std::span<Contact> contacts, double steps, const Movers& movers,
     const double by = answer(contact, steps, movers);
     const bool gives_up = std::max(contact.way.along, contact.in_step.along) > contact.most_given;
     if (gives_up) {
-      // takes back what it has given
-      for (Contact::Change* given : {&contact.way, &contact.in_step}) {
-        given->along = -given->along;
-        given->sliding = -given->sliding;
-      }
-      give_again(contact, movers);
+      give_times(-1, contact, movers);
       contact.way = contact.in_step = {};
     }
     if (gives_up || by > kSmall * contact.thickness) {
       ++now;
       for (const int i : contact.particle) movers.changed[static_cast<std::size_t>(i)] = now;
     }
-    contact.looked_at = gives_up ? Contact::kNever : now;
+    contact.looked_at = gives_up ? PairContact::kNever : now;
   }
 }
 
@@ -163,13 +159,13 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace weft {
 
-HWY_EXPORT(give_again);
+HWY_EXPORT(give_times);
 HWY_EXPORT(answer_all);
 
-void give(const Contact& contact, const Movers& movers) {
-  HWY_DYNAMIC_DISPATCH(give_again)(contact, movers);
+void give(const PairContact& contact, const Movers& movers) {
+  HWY_DYNAMIC_DISPATCH(give_times)(1, contact, movers);
 }
-void answer(std::span<Contact> contacts, double steps, const Movers& movers, int& now) {
+void answer(std::span<PairContact> contacts, double steps, const Movers& movers, int& now) {
   HWY_DYNAMIC_DISPATCH(answer_all)(contacts, steps, movers, now);
 }
 

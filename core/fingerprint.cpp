@@ -104,7 +104,11 @@ std::uint64_t fingerprint() {
   draft.solver.frame_step = 2.5e-4;
   draft.solver.substep = 2.5e-5;
   for (SheetDefinition& sheet : draft.sheets) sheet.textile.damping_ratio = 0.02;
-  for (const Scene& scene : {single, twofold, plain, tethered, draft, dressed_scene()}) {
+  const Scene dressed = dressed_scene();
+  Scene fine = dressed;
+  fine.solver = default_settings(Accuracy::kFine);
+  fine.solver.frame_step = dressed.solver.frame_step;
+  for (const Scene& scene : {single, twofold, plain, tethered, draft, dressed, fine}) {
     Simulation simulation(scene);
     std::vector<double> x(3 * static_cast<std::size_t>(simulation.particle_count()));
     for (int frame = 0; frame < 4; ++frame) {

@@ -226,7 +226,7 @@ void describe_cloth_contact(const Scene& scene, Plan& plan) {
     plan.skipped.push_back({"cloth contact", "cloth_contact is not set"});
     return;
   }
-  const int steps = ClothContact::most_steps(plan.step.substep);
+  const int steps = ClothContact::most_steps(scene.solver, plan.step.substep);
   for (const SheetDefinition& sheet : scene.sheets)
     plan.passes.push_back(join(sheet.name, ": cloth contact at ", sheet.thickness_or_default(),
                                " m, ", triangle_count(sheet.shape), " triangles, every ",

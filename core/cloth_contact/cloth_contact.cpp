@@ -17,6 +17,11 @@ constexpr double kWindowTime = 2.5e-4;
 constexpr double kWindowReach = 0.5, kLeastReach = 0.02;
 constexpr double kSpare = 1.25;  // where steps are faster than the ones before
 
+// Of windows.
+double share_of(const SolverSettings& settings) {
+  return std::min(1.0, settings.safety / SolverSettings().safety);
+}
+
 }  // namespace
 
 ClothContact::ClothContact(const Scene& scene, const LeftOut& left_out)
@@ -24,8 +29,9 @@ ClothContact::ClothContact(const Scene& scene, const LeftOut& left_out)
   forget();
 }
 
-int ClothContact::most_steps(double dt, int halvings) {
-  return std::max(1, static_cast<int>(std::min(std::ldexp(kWindowTime / dt, -halvings), 1e6)));
+int ClothContact::most_steps(const SolverSettings& settings, double dt, int halvings) {
+  const double time = std::ldexp(share_of(settings) * kWindowTime, -halvings);
+  return std::max(1, static_cast<int>(std::min(time / dt, 1e6)));
 }
 
 void ClothContact::forget() {
@@ -65,7 +71,7 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
   const bool is_known = window_.is_known;
   // the begin of a window of one step told where it ends, unless pairs are led apart meanwhile
   const bool is_read = window_.steps == 1 && untangling_.empty();
-  window_ = {.most_steps = ends_frame ? 1 : most_steps(dt, halvings_)};
+  window_ = {.most_steps = ends_frame ? 1 : most_steps(scene_.solver, dt, halvings_)};
   untangling_.lead(sheets, dt);
   if (is_known) {
     if (!is_read) read(sheets, pool);
@@ -114,8 +120,8 @@ void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step, T
 
 // Of the motion in a window whose steps are like one, m.
 double ClothContact::reach(double in_step) const {
-  return std::clamp(kSpare * window_.most_steps * in_step, kLeastReach * cloth_.thickest,
-                    kWindowReach * cloth_.thickest);
+  const double all = share_of(scene_.solver) * cloth_.thickest;
+  return std::clamp(kSpare * window_.most_steps * in_step, kLeastReach * all, kWindowReach * all);
 }
 
 // What may have met in the window.

@@ -32,8 +32,9 @@ class ClothContact {
   void forget();
   // Sheets are where they were, but solvers begin anew: cuts stay known.
   void forget_motion();
-  // After how many steps of dt (s) it acts, at most, where windows are halved so often.
-  static int most_steps(double dt, int halvings = 0);
+  // After how many steps of dt (s) it acts, at most, where windows are halved so often. They are
+  // shorter by as much as steps are by their safety: what they cost in error is of first order.
+  static int most_steps(const SolverSettings& settings, double dt, int halvings = 0);
 
   // To be called before each attempt at a frame, in which windows are halved so often. Looks for
   // cloth that has passed through cloth: until the next call such pairs do not keep each other

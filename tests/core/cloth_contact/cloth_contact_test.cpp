@@ -234,6 +234,23 @@ TEST(ClothContact, MissesNoPairThatAPlainSearchOfAllFinds) {
 }
 
 // Bit for bit: pins rest while nothing is near, and then jerk one sheet through the other.
+TEST(ClothContact, ErrsOfFirstOrderInTheSafetyOfSteps) {
+  const auto end = [](double safety) {
+    Scene scene = collision(Precision::kDouble, 1, 0.25);
+    scene.solver.frame_step = 0.03;
+    scene.solver.substep = 1e-5;
+    scene.solver.safety = safety;
+    Simulation simulation(scene);
+    EXPECT_TRUE(simulation.advance_frame());
+    return positions(simulation);
+  };
+  const Matrix3Xd in_each_step = end(0.01);
+  const double standard = (end(0.9) - in_each_step).norm(),
+               fine = (end(0.225) - in_each_step).norm();
+  ASSERT_GT(standard, 1e-3);
+  EXPECT_LT(fine, 0.35 * standard);
+}
+
 TEST(ClothContact, MissesNoPairWhereAPinBeginsToMoveWithinAWindow) {
   constexpr double kSpeed = 20;  // m/s
   for (unsigned seed = 1; seed <= 5; ++seed) {

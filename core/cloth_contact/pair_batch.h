@@ -19,6 +19,7 @@ class PairBatch {
   // Of particles at x, (3 x particles) m, which outlives it.
   PairBatch(bool edges, const Matrix3Xd& x) : edges_(edges), x_(x.data()) {}
 
+  bool edges() const { return edges_; }
   bool full() const { return size_ == kMost; }
   std::size_t size() const { return size_; }
   void clear() { size_ = 0; }

@@ -51,7 +51,7 @@ void Separation::touch(bool edges, std::span<const NearCloth> near, const Surrou
     batch.find_near(around.movers);
     for (std::size_t n = 0; n < batch.near_size(); ++n) {
       const auto& [candidate, friction] = waiting[batch.near(n)];
-      add(edges, *candidate, friction, batch, n, around, found);
+      add(*candidate, friction, batch, n, around, found);
     }
     batch.clear();
   };
@@ -75,13 +75,12 @@ void Separation::touch(bool edges, std::span<const NearCloth> near, const Surrou
 
 // That may have come nearer than its thickness, as far as its particles moved in relation to each
 // other.
-void Separation::add(bool edges, const Candidate& candidate, double friction,
-                     const PairBatch& batch, std::size_t near, const Surroundings& around,
-                     Found& found) {
+void Separation::add(const Candidate& candidate, double friction, const PairBatch& batch,
+                     std::size_t near, const Surroundings& around, Found& found) {
   constexpr double kLeastReach = 0.02;      // of the thickness, where things nearly touch
   constexpr double kLeastMoves = 0.01;      // of its lightest particle's 1 / mass
   constexpr double kMostGivenIfHeld = 0.1;  // of the thickness
-  const std::size_t k = batch.near(near), ends = edges ? 2 : 1;
+  const std::size_t k = batch.near(near), ends = batch.edges() ? 2 : 1;
   const double distance = std::sqrt(batch.squared(k)), room = distance - candidate.thickness;
   if (room >= around.most || (room > 0 && room * room >= batch.squared_way(near))) return;
   if (!around.untangling.empty() && around.untangling.has(candidate.particle)) return;
@@ -108,7 +107,7 @@ void Separation::add(bool edges, const Candidate& candidate, double friction,
 
   PairContact& contact = found.contacts.emplace_back();
   contact.particle = candidate.particle;
-  contact.edges = edges;
+  contact.edges = batch.edges();
   contact.weight = weight;
   contact.share = share;
   contact.normal << batch.apart(k) / distance, 0;

@@ -79,7 +79,7 @@ class Separation {
 
   static void touch(bool edges, std::span<const NearCloth> near, const Surroundings& around,
                     Found& found);
-  static void add(bool edges, const Candidate& candidate, double friction, const PairBatch& batch,
+  static void add(const Candidate& candidate, double friction, const PairBatch& batch,
                   std::size_t near, const Surroundings& around, Found& found);
   void set_out(const Ways& ways, ThreadPool& pool);
   template <class F>

@@ -235,26 +235,25 @@ void friction_angle(Page& page) {
 void window_error(Page& page) {
   constexpr double kInEachStep = 0.01;  // a safety for which windows are shorter than a step
   constexpr double kShorter = 4;        // steps, so that the shortest window shown has some
-  std::vector<Cells> rows;
   const std::vector<ContactScene> all = contact_scenes(false);
   const Scene& twisted = std::ranges::find(all, "twist", &ContactScene::name)->scene;
+  const auto run = [](Scene scene, int frames, double safety) {
+    scene.solver.substep = Simulation(scene).plan().step.substep / kShorter;
+    scene.solver.safety = safety;
+    Simulation simulation(scene);
+    const double begin = processor_time();
+    while (simulation.frame() < frames)
+      if (!simulation.advance_frame()) throw std::runtime_error(simulation.failure());
+    return std::pair{testing::positions(simulation), processor_time() - begin};
+  };
   const std::vector<std::tuple<std::string, Scene, int>> cases = {
       {"the tube, when it has met itself", twisted, 18},
       {"0.3 m fall onto a ball", draped(31), 10}};
+  std::vector<Cells> rows;
   for (const auto& [says, scene, frames] : cases) {
-    const auto run = [&](double safety) {
-      Scene shorter = scene;
-      shorter.solver.substep = Simulation(scene).plan().step.substep / kShorter;
-      shorter.solver.safety = safety;
-      Simulation simulation(shorter);
-      const double begin = processor_time();
-      while (simulation.frame() < frames)
-        if (!simulation.advance_frame()) throw std::runtime_error(simulation.failure());
-      return std::pair{testing::positions(simulation), processor_time() - begin};
-    };
-    const auto [truth, slowest] = run(kInEachStep);
+    const auto [truth, slowest] = run(scene, frames, kInEachStep);
     for (const double safety : {0.9, 0.45, 0.225}) {
-      const auto [x, time] = run(safety);
+      const auto [x, time] = run(scene, frames, safety);
       const double error = std::sqrt((x - truth).colwise().squaredNorm().mean());
       rows.push_back({says, fmt::format("{}", safety), fmt::format("{:.4f}", 1e3 * error),
                       fmt::format("{:.2f}", time / slowest)});

@@ -233,7 +233,6 @@ TEST(ClothContact, MissesNoPairThatAPlainSearchOfAllFinds) {
   }
 }
 
-// Bit for bit: pins rest while nothing is near, and then jerk one sheet through the other.
 TEST(ClothContact, ErrsOfFirstOrderInTheSafetyOfSteps) {
   const auto end = [](double safety) {
     Scene scene = collision(Precision::kDouble, 1, 0.25);
@@ -251,6 +250,7 @@ TEST(ClothContact, ErrsOfFirstOrderInTheSafetyOfSteps) {
   EXPECT_LT(fine, 0.35 * standard);
 }
 
+// Bit for bit: pins rest while nothing is near, and then jerk one sheet through the other.
 TEST(ClothContact, MissesNoPairWhereAPinBeginsToMoveWithinAWindow) {
   constexpr double kSpeed = 20;  // m/s
   for (unsigned seed = 1; seed <= 5; ++seed) {

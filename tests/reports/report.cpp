@@ -67,6 +67,10 @@ std::string machine(const std::string& commit) {
 
 std::string number(double value) { return fmt::format("{:.4g}", value); }
 
+std::string short_number(double value) {
+  return std::isfinite(value) ? fmt::format("{:.2g}", value) : "-";
+}
+
 }  // namespace weft::reports
 
 int main(int argc, char** argv) {

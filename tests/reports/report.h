@@ -35,6 +35,8 @@ class Page {
 // "Intel(R) ..., 2 cores; commit 0123abc"
 std::string machine(const std::string& commit);
 std::string number(double value);
+// To two digits; "-" where it is not finite.
+std::string short_number(double value);
 
 // Each writes a page; `large` for finer meshes and more cases.
 void accuracy(const std::filesystem::path& folder, const std::string& commit, bool large);

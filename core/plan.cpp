@@ -56,12 +56,6 @@ std::vector<StableStep> stable_steps(const Scene& scene, const std::vector<Plann
   return steps;
 }
 
-// The longest step that a sheet's damping bears, as a share of its linear bound.
-double share_of(const SolverSettings& solver, const StableStep& stable) {
-  if (!is_verlet(solver.integrator)) return solver.safety;
-  return std::min(solver.safety, safe_share(stable.connection_ratio));
-}
-
 // By how much the step may be longer than one for every shape.
 double gain_of(const Scene& scene, const std::vector<PlannedSheet>& planned,
                const std::vector<StableStep>& steps) {
@@ -86,7 +80,7 @@ StepPlan plan_step(const Scene& scene, const std::vector<StableStep>& sheets, do
   double safe = step.linear_bound;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const StableStep& stable = sheets[s];
-    safe = std::min(safe, share_of(solver, stable) * stable.linear_bound);
+    safe = std::min(safe, borne_share(solver, stable) * stable.linear_bound);
     step.estimated_bound = std::min(step.estimated_bound, stable.estimate);
     if (s > 0 && stable.linear_bound >= step.linear_bound) continue;
     step.linear_bound = stable.linear_bound;

@@ -153,7 +153,7 @@ void warn_of_damping(const Scene& scene, const std::vector<PlannedSheet>& planne
     return;
   }
   if (!is_verlet(scene.solver.integrator) || safe_share(ratio) == 1) return;
-  const double safe = std::min(scene.solver.safety, safe_share(ratio)) * stable.linear_bound;
+  const double safe = borne_share(scene.solver, stable) * stable.linear_bound;
   const double enough = damping_of(scene.sheets[index], mesh, kSafeDampingRatio);
   if (const auto& asked = scene.solver.substep; asked && *asked > safe * (1 + 1e-9))
     plan.warnings.push_back(

@@ -546,6 +546,11 @@ double safe_share(double connection_ratio) {
   return std::lerp(kLeast, kMost, along);
 }
 
+double borne_share(const SolverSettings& solver, const StableStep& stable) {
+  if (!is_verlet(solver.integrator)) return solver.safety;
+  return std::min(solver.safety, safe_share(stable.connection_ratio));
+}
+
 double unsheared_share(const Mesh& mesh, double connection_ratio) {
   constexpr double kNone = 2e-3, kAll = 1e-2, kSwitching = 0.75;
   const bool switches = mesh.surface.membrane.empty() || !mesh.surface.pushes;

@@ -44,6 +44,9 @@ double damping_for(const Mesh& mesh, double ratio);
 // `./dev bench stability`: at 0.9 of the bound growth begins below ratios of 1e-4 to 9e-4, at 0.45
 // below 1e-4.
 double safe_share(double connection_ratio);
+// The share of its linear bound that a sheet's step may be: the solver's safety, or less where its
+// damping bears less.
+double borne_share(const SolverSettings& solver, const StableStep& stable);
 
 // The share of what unsheared_gain() adds that may be taken: longer steps feed connections that
 // switch and are damped little. From campaigns of random sheets, as safe_share() is.

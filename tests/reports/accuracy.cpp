@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -12,7 +11,6 @@
 #include "tests/reports/accuracy_trials.h"
 #include "tests/reports/measurements.h"
 #include "tests/reports/report.h"
-#include "tests/support/core/scenes.h"
 
 namespace weft::reports {
 namespace {

@@ -69,13 +69,11 @@ void interpolation(Page& page) {
   page.text("## Frames finer than what is simulated");
   page.text(fmt::format(
       "With `grid.simulated_every` n each n-th row and column of {0} x {0} particles is "
-      "simulated, "
-      "and frames interpolate the others. RMS distance in mm of all particles from a run that "
-      "simulates them all, after {1:.2g} s and 1 s, and in brackets the time of a simulated "
-      "second "
-      "over what that run takes. Beside it what interpolation alone adds: of each {2}th particle "
-      "of that run, and the others between. Nearly all of an error is the coarser mesh's: other "
-      "bends, other folds.",
+      "simulated, and frames interpolate the others. RMS distance in mm of all particles from a "
+      "run that simulates them all, after {1:.2g} s and 1 s, and in brackets the time of a "
+      "simulated second over what that run takes. Beside it what interpolation alone adds: of each "
+      "{2}th particle of that run, and the others between. Nearly all of an error is the coarser "
+      "mesh's: other bends, other folds.",
       kCells + 1, kMostFrames / 60.0, kShown));
   const NamedAccuracy standard{"STANDARD", Accuracy::kStandard};
   std::vector<Cells> rows;
@@ -152,8 +150,7 @@ void less_damping(Page& page) {
   page.text(fmt::format(
       "RMS distance in m, after {:.2g} s on 16 x 16 particles, of runs in double at the planned "
       "step and half of it, and at a quarter and an eighth. Where the second is hardly smaller, "
-      "a "
-      "shorter step is no remedy: connections chatter between slack and taut, paths part, and "
+      "a shorter step is no remedy: connections chatter between slack and taut, paths part, and "
       "what is 1 mm apart is another fold, not a worse one. The paper's k_d is 2e-4 kg/s.",
       kMostFrames / 60.0));
   std::vector<Cells> rows;

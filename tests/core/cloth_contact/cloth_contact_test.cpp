@@ -6,71 +6,20 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 #include <regex>
 #include <string>
 #include <utility>
 
-#include "core/cloth_contact/cuts.h"
-#include "core/triangles/cut.h"
 #include "tests/support/core/bodies.h"
 #include "tests/support/core/scenes.h"
+#include "tests/support/core/touching_sheets.h"
 
 namespace weft::testing {
 namespace {
 
-Textile soft_cloth(double friction = 0.3) {
-  Textile textile;
-  textile.model = MeasuredTextile{.areal_density = 0.2,
-                                  .tensile_warp = 200,
-                                  .tensile_weft = 200,
-                                  .shear = 20,
-                                  .bend_rigidity_warp = 1e-5,
-                                  .bend_rigidity_weft = 1e-5};
-  textile.friction = friction;
-  return textile;
-}
-
-SheetDefinition lattice(int rows, int columns, double spacing = 0.01) {
-  SheetDefinition sheet;
-  sheet.name = "lattice";
-  sheet.shape = Grid{rows, columns, spacing};
-  sheet.textile = soft_cloth();
-  sheet.bending = Isometric{};
-  return sheet;
-}
-
-SheetDefinition triangles(double length, double width, double spacing = 0.01) {
-  SheetDefinition sheet = lattice(2, 2);
-  sheet.name = "triangles";
-  sheet.shape = complete(triangle_mesh(cut_rectangle(Cut::kAlternating, length, width, spacing)));
-  return sheet;
-}
-
-Scene touching(const std::vector<SheetDefinition>& sheets) {
-  Scene scene;
-  scene.sheets = sheets;
-  scene.cloth_contact = true;
-  return scene;
-}
-
-std::vector<Matrix3Xd> by_sheet(const Simulation& simulation, const Matrix3Xd& all) {
-  std::vector<Matrix3Xd> x;
-  Eigen::Index first = 0;
-  for (const SheetDefinition& sheet : simulation.scene().sheets) {
-    x.emplace_back(all.middleCols(first, sheet.particle_count()));
-    first += sheet.particle_count();
-  }
-  return x;
-}
-
-std::int64_t cuts_now(const Simulation& simulation) {
-  return count_cuts(simulation.scene().sheets, by_sheet(simulation, positions(simulation))).count;
-}
-
 // Two sheets that meet crumpled and fast, one of each kind; without weight or air.
 Scene collision(Precision precision, unsigned seed = 1, double haste = 1) {
-  SheetDefinition one = lattice(9, 9), other = triangles(0.08, 0.08);
+  SheetDefinition one = soft_lattice(9, 9), other = soft_rectangle(0.08, 0.08);
   other.origin = {0.003, 0.01, -0.002};
   for (SheetDefinition* sheet : {&one, &other}) {
     const int n = sheet->particle_count();
@@ -126,7 +75,7 @@ TEST(ClothContact, KeepsMomentumAndAngularMomentum) {
 }
 
 TEST(ClothContact, ASheetComesToLieOnAnotherAtItsThickness) {
-  SheetDefinition below = triangles(0.1, 0.1), above = triangles(0.1, 0.1);
+  SheetDefinition below = soft_rectangle(0.1, 0.1), above = soft_rectangle(0.1, 0.1);
   above.name = "above";
   above.origin = {0.002, 0.006, 0.003};
   below.thickness = 1.5e-3;
@@ -145,7 +94,7 @@ TEST(ClothContact, AStackOfSheetsIsCarriedByTheLowest) {
   constexpr int kSheets = 8;
   std::vector<SheetDefinition> sheets;
   for (int s = 0; s < kSheets; ++s) {
-    sheets.push_back(triangles(0.05, 0.05));
+    sheets.push_back(soft_rectangle(0.05, 0.05));
     sheets.back().name = std::to_string(s);
     sheets.back().origin = {1e-3 * s, 2.2e-3 * s, -7e-4 * s};
   }
@@ -168,7 +117,7 @@ TEST(ClothContact, AStackOfSheetsIsCarriedByTheLowest) {
 Scene held_in_layers(double apart, double down) {
   std::vector<SheetDefinition> sheets;
   for (int s = 0; s < 2; ++s) {
-    SheetDefinition& sheet = sheets.emplace_back(triangles(0.2, 0.2));
+    SheetDefinition& sheet = sheets.emplace_back(soft_rectangle(0.2, 0.2));
     sheet.name = std::to_string(s);
     sheet.textile = soft_cloth(0.1);
     sheet.textile.damping_ratio = 0.1;
@@ -255,7 +204,7 @@ TEST(ClothContact, MissesNoPairWhereAPinBeginsToMoveWithinAWindow) {
   constexpr double kSpeed = 20;  // m/s
   for (unsigned seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(seed);
-    SheetDefinition above = lattice(9, 9), below = triangles(0.08, 0.08);
+    SheetDefinition above = soft_lattice(9, 9), below = soft_rectangle(0.08, 0.08);
     above.origin.y() = 2.2e-3 + 2e-4 * seed;
     const Vector3d aside = 0.2 * noise(1, seed);
     const Vector3d way = 0.04 * (aside - Vector3d::UnitY()).normalized();
@@ -282,7 +231,7 @@ TEST(ClothContact, MissesNoPairWhereAPinBeginsToMoveWithinAWindow) {
 
 // Bit for bit: one that is folded over swings together, of which nothing is near to begin with.
 TEST(ClothContact, MissesNoPairOfASheetThatSwingsTogetherFromAfar) {
-  for (SheetDefinition sheet : {triangles(0.16, 0.08), lattice(17, 9)}) {
+  for (SheetDefinition sheet : {soft_rectangle(0.16, 0.08), soft_lattice(17, 9)}) {
     SCOPED_TRACE(sheet.name);
     Matrix3Xd x = start_positions(sheet), v = Matrix3Xd::Zero(3, x.cols());
     const double half = 0.08, angle = 0.9;
@@ -326,7 +275,7 @@ class Threads : public ThreadPool {
 };
 
 TEST(ClothContact, DoesNotDependOnThreads) {
-  SheetDefinition below = lattice(65, 128, 0.005), above = triangles(0.2, 0.2, 0.005);
+  SheetDefinition below = soft_lattice(65, 128, 0.005), above = soft_rectangle(0.2, 0.2, 0.005);
   above.origin.y() = 0.003;
   above.start_velocities.assign(3 * static_cast<std::size_t>(above.particle_count()), -0.3);
   Scene scene = touching({below, above});
@@ -357,7 +306,7 @@ TEST(ClothContact, GoesOnFromASnapshotToTheBit) {
 
 // A patch on a sheet that is pinned all over and inclined.
 double slide(double friction, double angle) {
-  SheetDefinition slope = triangles(0.3, 0.1), patch = triangles(0.04, 0.04);
+  SheetDefinition slope = soft_rectangle(0.3, 0.1), patch = soft_rectangle(0.04, 0.04);
   patch.name = "patch";
   const Quaterniond turn(Eigen::AngleAxisd(-angle, Vector3d::UnitZ()));
   const double thickness = 2e-3;
@@ -386,126 +335,8 @@ TEST(ClothContact, APatchSlidesDownAnInclinedSheetBeyondTheAngleOfFriction) {
   }
 }
 
-TEST(ClothContact, AStripTwistedAndBackDoesNotPassThroughItself) {
-  SheetDefinition band = triangles(0.2, 0.1);
-  Matrix3Xd x = start_positions(band);
-  constexpr double kTurns = 1.5, kTime = 1.0;
-  const double length = 0.2, middle = 0.05;
-  for (Eigen::Index i = 0; i < x.cols(); ++i) {
-    const double end = x(0, i) < 1e-9 ? -1 : x(0, i) > length - 1e-9 ? 1 : 0;
-    if (end == 0) continue;
-    Pin& pin = band.pins.emplace_back();
-    pin.particles = {static_cast<int>(i)};
-    constexpr int kKeys = 200;
-    for (int k = 0; k <= kKeys; ++k) {
-      const double share = 1 - std::abs(1 - 2.0 * k / kKeys);
-      const double angle = end * std::numbers::pi * kTurns * share, z = x(2, i) - middle;
-      pin.path.push_back(
-          {kTime * k / kKeys, {-end * 0.04 * share, z * std::sin(angle), z * std::cos(angle) - z}});
-    }
-  }
-  band.start_positions = values((x + 1e-5 * noise(static_cast<int>(x.cols()))).eval());
-  Scene scene = touching({band});
-  scene.environment.gravity.setZero();
-  Simulation simulation(scene);
-  std::int64_t cuts = 0;
-  for (int frame = 0; frame < 66; ++frame) {
-    ASSERT_TRUE(simulation.advance_frame());
-    cuts += cuts_now(simulation);
-  }
-  EXPECT_EQ(cuts, 0);
-}
-
-TEST(ClothContact, ASheetPouredIntoAHeapDoesNotPassThroughItself) {
-  SheetDefinition sheet = triangles(0.2, 0.2);
-  const Matrix3Xd flat = start_positions(sheet);
-  Matrix3Xd upright(3, flat.cols());
-  for (Eigen::Index i = 0; i < flat.cols(); ++i)
-    upright.col(i) = Vector3d(flat(0, i), flat(2, i) + 0.01, 0.01 * std::sin(40 * flat(2, i)));
-  sheet.start_positions = values(upright);
-  Scene scene = touching({sheet});
-  scene.colliders.push_back({"floor", Plane{}, 0.5, {}});
-  Simulation simulation(scene);
-  std::int64_t cuts = 0;
-  for (int frame = 0; frame < 45; ++frame) {
-    ASSERT_TRUE(simulation.advance_frame());
-    cuts += cuts_now(simulation);
-  }
-  EXPECT_EQ(cuts, 0);
-  EXPECT_LT(positions(simulation).row(1).maxCoeff(), 0.1);
-}
-
-// Upright, in waves, on a floor; in steps that are long for its crumpling.
-Scene crumpling() {
-  SheetDefinition sheet = triangles(0.15, 0.15, 0.0125);
-  std::get<MeasuredTextile>(sheet.textile.model) = light_textile(0.2);
-  Matrix3Xd x = start_positions(sheet);
-  for (auto at : x.colwise())
-    at = Vector3d(at.x(), at.z() + 0.01,
-                  0.02 * std::sin(20 * at.z()) + 1e-3 * std::sin(200 * at.x()));
-  sheet.start_positions = values(x);
-  Scene scene = touching({sheet});
-  scene.colliders.push_back({"floor", Plane{}, 0.5, {}});
-  scene.solver = default_settings(Accuracy::kDraft);
-  return scene;
-}
-
-TEST(ClothContact, AFrameInWhichClothPassesThroughItselfIsComputedAgainInShorterSteps) {
-  Scene unguarded = crumpling();
-  unguarded.solver.max_repairs = 0;
-  Simulation simulation(crumpling()), passes(unguarded);
-  std::int64_t cuts = 0, cuts_unguarded = 0;
-  for (int frame = 0; frame < 15; ++frame) {
-    ASSERT_TRUE(simulation.advance_frame());
-    ASSERT_TRUE(passes.advance_frame());
-    cuts += cuts_now(simulation);
-    cuts_unguarded += cuts_now(passes);
-  }
-  EXPECT_GT(cuts_unguarded, 0);
-  EXPECT_EQ(cuts, 0);
-  ASSERT_EQ(simulation.repairs().size(), 1u);
-  EXPECT_THAT(simulation.repairs()[0].reason,
-              ::testing::MatchesRegex("[0-9]+ cuts, where the frame began with none"));
-}
-
-// The energy that it gets is no fault of the step.
-TEST(ClothContact, ASheetThatAnotherDrawsAlongNeedsNoRepair) {
-  SheetDefinition cloth = triangles(0.3, 0.08), napkin = triangles(0.04, 0.04);
-  napkin.name = "napkin";
-  napkin.origin = {0.05, 2e-3, 0.02};
-  const Matrix3Xd x = start_positions(cloth);
-  for (Eigen::Index i = 0; i < x.cols(); ++i) {
-    if (x(0, i) < 0.3 - 1e-9) continue;
-    Pin& pin = cloth.pins.emplace_back();
-    pin.particles = {static_cast<int>(i)};
-    for (int k = 0; k <= 100; ++k) pin.path.push_back({0.01 * k, {0.4 * k * k * 1e-4, 0, 0}});
-  }
-  Scene scene = touching({cloth, napkin});
-  scene.colliders.push_back({"table", Plane{Vector3d(0, -1e-3, 0)}, 0.2, {}});
-  Simulation simulation(scene);
-  const Vector3d before = by_sheet(simulation, positions(simulation))[1].rowwise().mean();
-  for (int frame = 0; frame < 60; ++frame) ASSERT_TRUE(simulation.advance_frame());
-  const Vector3d after = by_sheet(simulation, positions(simulation))[1].rowwise().mean();
-  EXPECT_GT((after - before).x(), 0.3);
-  EXPECT_EQ(simulation.repairs().size(), 0u);
-}
-
-TEST(ClothContact, CutsOfAFrameAreAmongItsFacts) {
-  SheetDefinition one = triangles(0.1, 0.1), other = lattice(5, 5);
-  other.origin = {0.03, -0.02, 0.04};
-  other.rotation = Quaterniond(Eigen::AngleAxisd(-1.2, Vector3d::UnitX()));
-  Scene scene = touching({one, other});
-  const Simulation tangled(scene);
-  EXPECT_GT(tangled.stats().cloth_cuts, 0);
-  EXPECT_EQ(tangled.stats().cloth_cuts, cuts_now(tangled));
-  scene.sheets[1].origin.y() = 0.1;
-  EXPECT_EQ(Simulation(scene).stats().cloth_cuts, 0);
-  scene.cloth_contact = false;
-  EXPECT_EQ(Simulation(scene).stats().cloth_cuts, std::nullopt);
-}
-
 TEST(ClothContact, IsNamedInThePlanWithWhatItCostsOrWhyItIsSkipped) {
-  Scene scene = touching({lattice(5, 4)});
+  Scene scene = touching({soft_lattice(5, 4)});
   std::get<MeasuredTextile>(scene.sheets[0].textile.model).tensile_warp = 1e4;
   const Plan plan = Simulation(scene).plan();
   const auto steps = static_cast<int>(2.5e-4 / plan.step.substep);
@@ -522,19 +353,19 @@ TEST(ClothContact, IsNamedInThePlanWithWhatItCostsOrWhyItIsSkipped) {
 }
 
 TEST(ClothContact, ThicknessIsBoundedByTheMesh) {
-  Scene scene = touching({lattice(3, 3)});
+  Scene scene = touching({soft_lattice(3, 3)});
   EXPECT_EQ(scene.sheets[0].thickness_or_default(), 2e-3);
   scene.sheets[0].thickness = 2.6e-3;
   const std::vector<Problem> problems = find_problems(scene);
   ASSERT_EQ(problems.size(), 1u);
   EXPECT_EQ(problems[0].field, "sheets[0].thickness_m");
   EXPECT_EQ(problems[0].message, "0.0026 m is not within 1e-06 to 0.0025 m");
-  scene.sheets[0] = lattice(3, 3, 0.004);
+  scene.sheets[0] = soft_lattice(3, 3, 0.004);
   EXPECT_EQ(scene.sheets[0].thickness_or_default(), 1e-3);
 }
 
 TEST(ClothContact, IsAskedForAndThenNotWarnedOf) {
-  Scene scene = touching({lattice(3, 3), triangles(0.02, 0.02)});
+  Scene scene = touching({soft_lattice(3, 3), soft_rectangle(0.02, 0.02)});
   scene.sheets[1].origin.y() = 0.1;
   const auto codes = [&] {
     std::vector<std::string> found;

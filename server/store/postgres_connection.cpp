@@ -42,9 +42,11 @@ std::string quoted(const std::string& value) {
 
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-// What the server says when it goes down or comes up, rather than of the work.
+// What the server says when it goes down or comes up, or when this process stood still for too
+// long, rather than of the work.
 bool is_going(const pqxx::sql_error& error) {
-  return error.sqlstate().starts_with("57P") || error.sqlstate().starts_with("08");
+  const std::string& state = error.sqlstate();
+  return state.starts_with("57P") || state.starts_with("08") || state == "25P03";
 }
 
 }  // namespace
@@ -63,6 +65,8 @@ PostgresConnection::PostgresConnection(const std::string& url, std::vector<State
 
 void PostgresConnection::connect() {
   connection_ = std::make_unique<pqxx::connection>(settings_);
+  connection_->set_variable("idle_in_transaction_session_timeout",
+                            std::to_string(kIdleInTransaction.count()));
   for (const auto& [name, text] : statements_) connection_->prepare(name, text);
   is_new_ = true;
 }

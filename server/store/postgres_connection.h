@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -29,6 +30,10 @@ class PostgresConnection {
 
   // Throws StoreError where the URL is none.
   explicit PostgresConnection(const std::string& url, std::vector<Statement> statements = {});
+
+  // How long a process may stand still within a transaction: then it loses the connection, and
+  // others the wait for what it had locked.
+  static constexpr std::chrono::milliseconds kIdleInTransaction{2000};
 
   // Carries the work out in one transaction, twice where an old connection turns out to be broken.
   // Throws StoreLost; StoreError where the database refuses it, and nothing is done.

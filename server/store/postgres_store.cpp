@@ -32,6 +32,8 @@ using records::entry_key;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kLease{3000}, kRenewal{400};
+constexpr milliseconds kLongestWait{3000};  // for what another transaction locks
+static_assert(PostgresConnection::kIdleInTransaction < std::min(kLease, kLongestWait));
 constexpr milliseconds kFirstPause{50}, kLongestPause{1000};  // before work is tried again
 constexpr int kOrphans = 4;                                   // that are named at a time
 
@@ -346,6 +348,7 @@ Claim PostgresStore::claim(const std::string& id) {
   calls_.run([&](pqxx::work& transaction) {
     claim = {};
     uid.clear();
+    transaction.exec("SET LOCAL lock_timeout = " + std::to_string(kLongestWait.count()));
     const auto taken = transaction.exec_params(
         "UPDATE weft.session SET owner = $2, epoch = epoch + 1 "
         "WHERE id = $1 AND (owner = $2 OR NOT weft.holds(owner, $2)) "
@@ -471,7 +474,8 @@ void PostgresStore::look_for_orphans() {
     ids.clear();
     for (const auto& row : transaction.exec_params(
              "SELECT s.id FROM weft.replica r JOIN weft.session s ON s.owner = r.number "
-             "WHERE r.number <> $1 AND NOT weft.holds(r.number, $1) ORDER BY random() LIMIT $2",
+             "WHERE r.number <> $1 AND NOT weft.holds(r.number, $1) ORDER BY random() LIMIT $2 "
+             "FOR UPDATE OF s SKIP LOCKED",  // or claims that must wait would pile up
              number_, kOrphans))
       ids.push_back(row[0].as<std::string>());
   });

@@ -2,12 +2,14 @@
 #include <chrono>
 #include <csignal>
 #include <fstream>
+#include <future>
 #include <pqxx/pqxx>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
 
 #include "server/store/assets.h"
+#include "server/store/postgres_connection.h"
 #include "server/store/records.h"
 #include "server/store/store.h"
 #include "tests/support/service/assets.h"
@@ -296,6 +298,54 @@ TEST_F(Fleet, LetsAnOldOwnerWriteNothing) {
   EXPECT_EQ(count("SELECT count(*) FROM weft.entry"), 2) << "one step of each";
   b->step(session, 10);
   expect_equal(frames(*b, session, 20), undisturbed(*b, 20));
+}
+
+// Where it hangs is chance: here, where it has locked a session and not said what becomes of it.
+TEST_F(Fleet, TakesASessionFromAServerThatHangsInATransaction) {
+  Replica a = replica("a");
+  const auto b = server("b");
+  const v1::Session session = a.create("curtain");
+  a.step(session, 5);
+
+  PostgresConnection of_a(database_->url());
+  of_a.run([](pqxx::work&) {});
+  std::promise<void> locked, taken;
+  int times = 0;
+  std::jthread hanging([&] {
+    of_a.run([&](pqxx::work& transaction) {
+      transaction.exec("UPDATE weft.session SET epoch = epoch");
+      if (++times > 1) return;
+      locked.set_value();
+      taken.get_future().wait();
+      transaction.exec("UPDATE weft.session SET epoch = epoch");
+    });
+  });
+  locked.get_future().wait();
+  a.kill();
+  EXPECT_EQ(insist(*b, session).frame(), 5);
+  taken.set_value();
+  hanging.join();
+  EXPECT_EQ(times, 2) << "done again on another connection";
+  b->step(session, 5);
+  expect_equal(frames(*b, session, 10), undisturbed(*b, 10));
+}
+
+TEST_F(Fleet, GoesOnWithOtherSessionsWhileOneIsLocked) {
+  Replica a = replica("a");
+  const auto b = server("b");
+  const v1::Session locked = a.create("curtain"), other = a.create("flag");
+  pqxx::connection stranger(database_->url());
+  auto lock = std::make_unique<pqxx::work>(stranger);
+  lock->exec("UPDATE weft.session SET epoch = epoch WHERE id = 'curtain'");
+  a.kill();
+  const Error error = get_error(*b, locked);
+  EXPECT_EQ(error.reason(), "STORE_UNREACHABLE");
+  EXPECT_THAT(error.message, HasSubstr("lock timeout"));
+  EXPECT_EQ(insist(*b, other).replica(), "b");
+  lock->abort();
+  while (get_error(*b, locked).reason() == "STORE_UNREACHABLE") {
+  }
+  EXPECT_EQ(insist(*b, locked).replica(), "b");
 }
 
 TEST_F(Fleet, TellsStreamsOfAnOldOwnerThatTheSessionIsElsewhere) {

@@ -1,10 +1,12 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <stop_token>
 #include <vector>
 
 #include "client/output/text.h"
 #include "client/templates/templates.h"
+#include "tests/stress/at_end.h"
 #include "tests/stress/caller.h"
 #include "tests/stress/recorded.h"
 #include "tests/stress/stress.h"
@@ -28,7 +30,10 @@ Seen endure(Disk disk, int rounds, int Caller::Counts::*expected, int enough) {
   Weftd weftd;
   const auto connection = weftd.connect();
   Hearing hearing(4);
-  std::vector<Recorded> all = record_sessions(weftd.path(""), *connection, scene, hearing);
+  std::stop_source stop;
+  const auto recorders = weftd.connect(stop.get_token());
+  std::vector<Recorded> all = record_sessions(weftd.path(""), *recorders, scene, hearing);
+  const AtEnd give_up([&] { stop.request_stop(); });
 
   Seen seen;
   {

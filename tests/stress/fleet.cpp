@@ -12,6 +12,7 @@
 #include <fstream>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "client/commands/commands.h"
 
@@ -60,8 +61,8 @@ Fleet::~Fleet() {
 
 std::string Fleet::name(std::size_t number) { return fmt::format("weftd-{}", number + 1); }
 
-std::unique_ptr<client::Connection> Fleet::connect() const {
-  return client::Connection::to(address_, {});
+std::unique_ptr<client::Connection> Fleet::connect(std::stop_token stop) const {
+  return client::Connection::to(address_, std::move(stop));
 }
 
 std::map<std::string, std::string> Fleet::owners(client::Connection& connection) {

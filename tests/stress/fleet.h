@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -26,7 +27,7 @@ class Fleet {
   Fleet& operator=(const Fleet&) = delete;
 
   // Through HAProxy.
-  std::unique_ptr<client::Connection> connect() const;
+  std::unique_ptr<client::Connection> connect(std::stop_token stop = {}) const;
   std::string path(const std::string& name) const { return directory_.path(name); }
 
   std::size_t size() const { return replicas_.size(); }

@@ -3,12 +3,14 @@
 #include <chrono>
 #include <memory>
 #include <random>
+#include <stop_token>
 #include <thread>
 #include <vector>
 
 #include "client/load/latencies.h"
 #include "client/output/text.h"
 #include "client/templates/templates.h"
+#include "tests/stress/at_end.h"
 #include "tests/stress/caller.h"
 #include "tests/stress/recorded.h"
 #include "tests/stress/stress.h"
@@ -23,7 +25,10 @@ Outcome kills(Form form) {
   Weftd weftd({"--snapshot-ms", "20"});  // each restart begins at the last one
   const auto connection = weftd.connect();
   Hearing hearing(4);
-  std::vector<Recorded> all = record_sessions(weftd.path(""), *connection, scene, hearing);
+  std::stop_source stop;
+  const auto recorders = weftd.connect(stop.get_token());
+  std::vector<Recorded> all = record_sessions(weftd.path(""), *recorders, scene, hearing);
+  const AtEnd give_up([&] { stop.request_stop(); });
 
   std::mt19937 random(20261121);
   client::Latencies resumes;

@@ -2,9 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <mutex>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "tests/stress/stress.h"
@@ -55,8 +61,31 @@ int usage() {
   return 2;
 }
 
+// Ends the process where a test of the short form does not come to its end.
+class Watchdog {
+ public:
+  Watchdog(const Test& test, Form form) {
+    if (form == Form::kShort) thread_ = std::jthread(&Watchdog::watch, test.name);
+  }
+
+ private:
+  static void watch(const std::stop_token& stop, const char* test) {
+    constexpr std::chrono::minutes kLongest{10};
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any().wait_for(lock, stop, kLongest, [] { return false; });
+    if (stop.stop_requested()) return;
+    fmt::print("{}: does not end within ten minutes SHORT\n", test);
+    std::fflush(stdout);
+    std::_Exit(1);
+  }
+
+  std::jthread thread_;
+};
+
 // False where what was seen decides against it.
 bool run(const Test& test, Form form) {
+  const Watchdog watchdog(test, form);
   Outcome outcome;
   try {
     outcome = test.run(form);

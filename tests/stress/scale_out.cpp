@@ -5,9 +5,11 @@
 #include <chrono>
 #include <functional>
 #include <future>
+#include <map>
 #include <memory>
 #include <random>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <utility>
@@ -19,6 +21,7 @@
 #include "client/recording/recorder.h"
 #include "client/scene_file.h"
 #include "client/templates/templates.h"
+#include "tests/stress/at_end.h"
 #include "tests/stress/caller.h"
 #include "tests/stress/fleet.h"
 #include "tests/stress/recorded.h"
@@ -41,6 +44,9 @@ class Production {
         all_(record_sessions(fleet.path(""), *recorders_, scene_, hearing_, kPace)) {
     caller_ = std::make_unique<Caller>(fleet.connect(), std::span(all_).first(sessions / 2));
   }
+  ~Production() { stop_.request_stop(); }
+  Production(const Production&) = delete;
+  Production& operator=(const Production&) = delete;
 
   const v1::Scene& scene() const { return scene_; }
   client::Connection& connection() { return *connection_; }
@@ -90,24 +96,13 @@ class Production {
   Fleet& fleet_;
   const v1::Scene scene_ = client::make_template("load", {.rows = 8, .columns = 8});
   const std::unique_ptr<client::Connection> connection_ = fleet_.connect();
-  const std::unique_ptr<client::Connection> recorders_ = fleet_.connect();
+  std::stop_source stop_;  // of the recorders, where they do not come to their end
+  const std::unique_ptr<client::Connection> recorders_ = fleet_.connect(stop_.get_token());
   Hearing hearing_;
   std::vector<Recorded> all_;
   std::unique_ptr<Caller> caller_;
   Caller::Counts counts_;
   Faults faults_;
-};
-
-// Undoes a trouble, whatever came of it.
-class AtEnd {
- public:
-  explicit AtEnd(std::function<void()> work) : work_(std::move(work)) {}
-  ~AtEnd() { work_(); }
-  AtEnd(const AtEnd&) = delete;
-  AtEnd& operator=(const AtEnd&) = delete;
-
- private:
-  const std::function<void()> work_;
 };
 
 std::string seconds(double time) { return client::seconds_text(time); }
@@ -185,7 +180,8 @@ Outcome fleet_freezes(Form form) {
     while (Fleet::name(number) != owner) ++number;
     Weftd& old = fleet.replica(number);
 
-    const auto straight = old.connect();
+    std::stop_source stop;
+    const auto straight = old.connect(stop.get_token());
     client::RecordingOrder order;
     order.session = one.session.name();
     order.path = fleet.path(fmt::format("old-{}.weft", i));
@@ -201,7 +197,10 @@ Outcome fleet_freezes(Form form) {
       } catch (const client::Problem&) {
         // it has lost the session
       }
+      begun = true;
+      begun.notify_all();
     });
+    const AtEnd give_up([&] { stop.request_stop(); });
     begun.wait(false);
     seen.emplace_back(&one, order.path);
 
@@ -349,6 +348,7 @@ Outcome fleet_reload(Form form) {
   std::vector<std::unique_ptr<client::Connection>> connections;
   std::vector<std::future<int>> readers;  // how often each began anew
   std::stop_source stop;
+  const AtEnd give_up([&] { stop.request_stop(); });
   for (std::size_t i = 0; i < kStreams; i += kStreamsOfASession) {
     v1::RunSessionRequest run;
     run.set_name(client::create_session(*connection, scene).name());

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 namespace weft::stress {
 namespace {
@@ -61,8 +62,8 @@ void Weftd::start() {
   }
 }
 
-std::unique_ptr<client::Connection> Weftd::connect() const {
-  return client::Connection::to(address(), {});
+std::unique_ptr<client::Connection> Weftd::connect(std::stop_token stop) const {
+  return client::Connection::to(address(), std::move(stop));
 }
 
 Usage Weftd::usage() const {

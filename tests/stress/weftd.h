@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,7 @@ class Weftd {
   Weftd& operator=(const Weftd&) = delete;
 
   std::string address() const { return host_ + ":" + port_; }
-  std::unique_ptr<client::Connection> connect() const;
+  std::unique_ptr<client::Connection> connect(std::stop_token stop = {}) const;
   std::string path(const std::string& name) const { return directory_.path(name); }
   Usage usage() const;
 

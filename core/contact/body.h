@@ -6,6 +6,7 @@
 
 #include "core/model/body.h"
 #include "core/model/scene.h"
+#include "core/motion/thread_pool.h"
 
 namespace weft {
 
@@ -23,6 +24,8 @@ struct MadeBody {
   std::shared_ptr<const Body> body;
   std::vector<Problem> problems;
 };
-MadeBody make_body(BodyMesh mesh, const BodySettings& settings, const std::string& field);
+// The same for any threads.
+MadeBody make_body(BodyMesh mesh, const BodySettings& settings, const std::string& field,
+                   ThreadPool& pool = calling_thread());
 
 }  // namespace weft

@@ -29,9 +29,10 @@ using Converted = std::variant<T, std::vector<Problem>>;
 // The mesh of an asset, by its name; nullptr where there is none.
 using FindMesh = std::function<std::shared_ptr<const v1::MeshData>(const std::string& name)>;
 
-// A scene that can be simulated. Paths in problems begin with `field`.
+// A scene that can be simulated. Paths in problems begin with `field`. Idle threads of the
+// scheduler, where one is given, help to make what takes long.
 Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field,
-                          const FindMesh& find_mesh = {});
+                          const FindMesh& find_mesh = {}, Scheduler* scheduler = nullptr);
 
 // The hashes of the assets that a scene names.
 std::set<std::string> assets_of(const Scene& scene);

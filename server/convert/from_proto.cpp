@@ -70,7 +70,8 @@ std::vector<std::string> names(const std::string& stem, const RepeatedPtrField<M
 // scene.
 class Reader {
  public:
-  explicit Reader(const FindMesh& find_mesh = {}) : find_mesh_(find_mesh) {}
+  explicit Reader(const FindMesh& find_mesh = {}, Scheduler* scheduler = nullptr)
+      : find_mesh_(find_mesh), scheduler_(scheduler) {}
 
   Scene scene(const v1::Scene& from);
   Textile textile(const v1::Textile& from, const std::string& field);
@@ -117,6 +118,7 @@ class Reader {
   void set_body(const v1::BodyMesh& from, const std::string& field, Collider& collider);
 
   const FindMesh& find_mesh_;
+  Scheduler* const scheduler_;  // or nullptr
   Accuracy accuracy_ = Accuracy::kStandard;
   double largest_skin_ = 0;  // of the sheets, m
   std::vector<Problem> problems_;
@@ -421,7 +423,7 @@ void Reader::set_body(const v1::BodyMesh& from, const std::string& field, Collid
   if (!data) return;
   // in steps, for scenes to share bodies
   const double reach = std::exp2(std::ceil(std::log2(std::max(largest_skin_, 1e-3))));
-  auto made = to_body(*data, collider.cell, reach, path);
+  auto made = to_body(*data, collider.cell, reach, path, scheduler_);
   if (auto* problems = std::get_if<std::vector<Problem>>(&made)) {
     std::move(problems->begin(), problems->end(), std::back_inserter(problems_));
   } else {
@@ -574,8 +576,8 @@ Pin to_pin(const v1::Pin& pin) {
 }
 
 Converted<Scene> to_scene(const v1::Scene& scene, const std::string& field,
-                          const FindMesh& find_mesh) {
-  Reader reader(find_mesh);
+                          const FindMesh& find_mesh, Scheduler* scheduler) {
+  Reader reader(find_mesh, scheduler);
   Scene read = reader.scene(scene);
   auto problems = std::move(reader).with(find_problems(read));
   if (problems.empty()) return read;

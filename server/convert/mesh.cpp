@@ -18,6 +18,7 @@
 #include "core/model/mesh_problems.h"
 #include "core/model/text.h"
 #include "server/session/baked_bodies.h"
+#include "server/session/idle_threads.h"
 #include "server/session/memory.h"
 
 namespace weft {
@@ -84,15 +85,18 @@ void check_size(const std::string& bytes, std::size_t unit, const std::string& f
 
 // A sixteenth of the memory is for bodies that may be asked for again.
 MadeBody shared_body(const v1::MeshData& from, const BodySettings& settings,
-                     const std::string& field) {
+                     const std::string& field, Scheduler* scheduler) {
+  constexpr int kMostThreads = 16;
   static BakedBodies bodies(static_cast<std::size_t>(memory_there_is() / 16));
   const std::string_view positions = positions_of(from);
   const std::string key = std::string(positions) + from.triangles() +
                           bytes_of(std::vector{static_cast<double>(positions.size()), settings.cell,
                                                settings.reach, settings.moves ? 1.0 : 0.0});
   return bodies.get(key, [&] {
-    return make_body({points_of<Vector3d>(positions), triangles_of(from.triangles())}, settings,
-                     field);
+    BodyMesh mesh{points_of<Vector3d>(positions), triangles_of(from.triangles())};
+    if (scheduler == nullptr) return make_body(std::move(mesh), settings, field);
+    IdleThreads pool(*scheduler, kMostThreads);
+    return make_body(std::move(mesh), settings, field, pool);
   });
 }
 
@@ -214,7 +218,7 @@ Converted<Triangles> to_mesh(const v1::MeshData& from, const std::string& field)
 }
 
 Converted<ConvertedBody> to_body(const v1::MeshData& from, std::optional<double> cell, double reach,
-                                 const std::string& field) {
+                                 const std::string& field, Scheduler* scheduler) {
   std::vector<Problem> problems = find_body_problems(from, field);
   ConvertedBody result;
   if (from.has_poses() && problems.empty()) {
@@ -224,10 +228,10 @@ Converted<ConvertedBody> to_body(const v1::MeshData& from, std::optional<double>
   }
   if (!problems.empty()) return problems;
   BodySettings settings{cell.value_or(0), reach, result.poses != nullptr};
-  MadeBody made = shared_body(from, settings, field);
+  MadeBody made = shared_body(from, settings, field, scheduler);
   if (!made.body) return std::move(made.problems);
   if (result.poses) settings.cell = least_pose_cell(*result.poses, made.body->mesh.triangles);
-  if (settings.cell > made.body->grid.cell) made = shared_body(from, settings, field);
+  if (settings.cell > made.body->grid.cell) made = shared_body(from, settings, field, scheduler);
   result.body = std::move(made.body);
   return result;
 }

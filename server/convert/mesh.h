@@ -21,9 +21,9 @@ struct ConvertedBody {
   std::shared_ptr<const Poses> poses;
 };
 // For sheets with skins up to `reach`, m, with cells of that edge, m, or all that is wrong with its
-// mesh.
+// mesh. Idle threads of the scheduler, where one is given, help to make it.
 Converted<ConvertedBody> to_body(const v1::MeshData& from, std::optional<double> cell, double reach,
-                                 const std::string& field);
+                                 const std::string& field, Scheduler* scheduler = nullptr);
 // What is wrong with a mesh that is neither a sheet nor a body.
 std::vector<Problem> find_problems(const v1::MeshData& mesh, const std::string& field);
 

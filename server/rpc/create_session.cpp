@@ -209,7 +209,7 @@ grpc::Status SessionService::create(const Caller& caller, const v1::CreateSessio
   const auto mesh = [&](const std::string& asset) {
     return find_mesh(backend_.store->assets(), caller, asset);
   };
-  auto converted = to_scene(request.session().scene(), "session.scene", mesh);
+  auto converted = to_scene(request.session().scene(), "session.scene", mesh, &backend_.scheduler);
   if (const auto* problems = std::get_if<std::vector<Problem>>(&converted)) {
     return errors::field_invalid(*problems);
   }

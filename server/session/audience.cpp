@@ -16,14 +16,16 @@ void Audience::trim(Time now) {
   history_.trim(first_held(now));
 }
 
-void Audience::add(FrameReader& reader) {
+void Audience::add(FrameReader& reader, Time now) {
   readers_.push_back(&reader);
-  if (reader.policy != SlowReader::kSkip) history_.set_read(true);
+  if (reader.policy == SlowReader::kSkip) return;
+  history_.set_read(true);
   if (reader.policy == SlowReader::kHoldSession && absent_holders_ && --absent_holders_->count == 0)
     absent_holders_.reset();
-  // where each begins says what has come to it
-  if (reader.policy != SlowReader::kSkip && absent_readers_ > 0 && --absent_readers_ == 0)
-    read_marks_.clear();
+  if (absent_readers_ > 0) --absent_readers_;
+  if (!read_marks_.empty() && read_marks_.back().next <= reader.next) return;
+  while (!read_marks_.empty() && read_marks_.back().next >= reader.next) read_marks_.pop_back();
+  read_marks_.push_back({now, reader.next});
 }
 
 int Audience::recorders() const {
@@ -51,11 +53,11 @@ Audience::Found Audience::take_next(FrameReader& reader) {
   return found;
 }
 
-void Audience::expect_back(const PublishLimit& left, Time now, Time until) {
+void Audience::expect_back(const PublishLimit& left, Time until) {
   if (!left.history_from) return;
   absent_until_ = until;
-  read_marks_.push_back({now, *left.history_from});
   absent_readers_ = left.readers;
+  absent_from_ = *left.history_from;
   if (left.holders > 0) absent_holders_ = AbsentHolders{left.holders, *left.history_from, until};
 }
 
@@ -131,7 +133,8 @@ std::int64_t Audience::wanted_from(Time now) {
     read_marks_.push_back({now, next});
   while (read_marks_.size() > 1 && now - read_marks_[1].time >= return_time_)
     read_marks_.pop_front();
-  for (const ReadMark& mark : read_marks_) next = std::min(next, mark.next);
+  if (!read_marks_.empty()) next = std::min(next, read_marks_.front().next);
+  if (absent_readers_ > 0 && now < absent_until_) next = std::min(next, absent_from_);
   return std::clamp(next, oldest(), latest());
 }
 

@@ -36,7 +36,7 @@ class Audience {
   std::int64_t latest() const { return newest()->number; }
   std::int64_t oldest() const { return history_.oldest(); }
 
-  void add(FrameReader& reader);
+  void add(FrameReader& reader, Time now);
   void remove(const FrameReader& reader) { std::erase(readers_, &reader); }
   bool has_any() const { return !readers_.empty(); }
   // Readers that want every frame.
@@ -53,7 +53,7 @@ class Audience {
   Found take_next(FrameReader& reader);
 
   // Readers that an earlier process had may come back until then.
-  void expect_back(const PublishLimit& left, Time now, Time until);
+  void expect_back(const PublishLimit& left, Time until);
   // Until when the next frame waits for holders that may come back.
   std::optional<Time> holds_until(Time now);
   // Whether the next frame has to wait for a reader. One that is here gets half of the history for
@@ -92,9 +92,10 @@ class Audience {
   const std::chrono::duration<double> return_time_;
   std::vector<FrameReader*> readers_;
   std::optional<AbsentHolders> absent_holders_;
-  int absent_readers_ = 0;  // that have not come back
+  int absent_readers_ = 0;        // that have not come back
+  std::int64_t absent_from_ = 0;  // the first frame that they want
   Time absent_until_;
-  std::deque<ReadMark> read_marks_;  // within the return time, the newest last
+  std::deque<ReadMark> read_marks_;  // within the return time, the newest and farthest last
 };
 
 }  // namespace weft

@@ -357,7 +357,7 @@ std::unique_ptr<Subscription> Session::subscribe(std::weak_ptr<FrameSink> sink,
   std::unique_lock lock(mutex_);
   auto subscription = std::make_unique<Subscription>(
       shared_from_this(), FrameReader{std::move(sink), start.value_or(latest()), policy});
-  audience_.add(subscription->reader_);
+  audience_.add(subscription->reader_, Clock::now());
   release();
   lock.unlock();
   wake();

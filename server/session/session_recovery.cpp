@@ -22,8 +22,7 @@ bool Session::restore(SavedSession saved) {
           Restoring{{std::make_move_iterator(next), std::make_move_iterator(saved.log.end())},
                     saved.limit.frame};
     }
-    const auto now = Clock::now();
-    audience_.expect_back(saved.limit, now, now + kHoldAfterRestore);
+    audience_.expect_back(saved.limit, Clock::now() + kHoldAfterRestore);
   }
   if (!repeats) let_go_of_streams();
   wake();

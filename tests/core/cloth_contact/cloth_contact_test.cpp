@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "tests/support/core/bodies.h"
+#include "tests/support/core/last_first.h"
 #include "tests/support/core/scenes.h"
 #include "tests/support/core/touching_sheets.h"
 
@@ -262,18 +263,6 @@ TEST(ClothContact, MissesNoPairOfASheetThatSwingsTogetherFromAfar) {
   }
 }
 
-class Threads : public ThreadPool {
- public:
-  explicit Threads(int threads) : threads_(threads) {}
-  int threads() const override { return threads_; }
-  void run(int parts, const std::function<void(int)>& part) override {
-    for (int k = parts - 1; k >= 0; --k) part(k);
-  }
-
- private:
-  int threads_;
-};
-
 TEST(ClothContact, DoesNotDependOnThreads) {
   SheetDefinition below = soft_lattice(65, 128, 0.005), above = soft_rectangle(0.2, 0.2, 0.005);
   above.origin.y() = 0.003;
@@ -281,7 +270,7 @@ TEST(ClothContact, DoesNotDependOnThreads) {
   Scene scene = touching({below, above});
   scene.solver.frame_step = 0.004;
   Simulation one(scene), other(scene);
-  Threads pool(4);
+  LastFirst pool(4);
   for (int frame = 0; frame < 1; ++frame) {
     ASSERT_TRUE(one.advance_frame());
     ASSERT_TRUE(other.advance_frame(pool));

@@ -10,6 +10,7 @@
 
 #include "core/contact/contact.h"
 #include "tests/support/core/bodies.h"
+#include "tests/support/core/last_first.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::testing {
@@ -19,6 +20,13 @@ std::vector<BodyMesh> meshes() {
   const Quaterniond turn(Eigen::AngleAxisd(0.6, Vector3d(1, 2, 3).normalized()));
   return {ball_mesh(0.1, 1), box_mesh({0.15, 0.1, 0.12}, turn),
           together(box_mesh({0.1, 0.05, 0.1}), box_mesh({0.05, 0.1, 0.04}, turn), {0.02, 0.1, 0})};
+}
+
+// Flat across its lower half, and turned over below.
+BodyMesh wrung_ball() {
+  BodyMesh mesh = ball_mesh(0.1, 3);
+  for (Vector3d& v : mesh.vertices) v.x() *= (v.y() + 0.02) / 0.1;
+  return mesh;
 }
 
 // Trilinear values round an edge off, by a third of a cell at most.
@@ -64,6 +72,27 @@ TEST(Bodies, OfAPersonsSizeHaveCellsOfHalfACentimetreInAFewMegabytes) {
   EXPECT_NEAR(made.body->thickness, 0.3 * std::sqrt(0.5), 0.15);
 }
 
+TEST(Bodies, AreTheSameHoweverManyThreadsMakeThem) {
+  std::vector<BodyMesh> all = meshes();
+  all.push_back(wrung_ball());
+  for (const BodyMesh& mesh : all) {
+    const BodySettings settings{.cell = 2e-3, .reach = 2e-3};
+    LastFirst three(3);
+    const MadeBody alone = make_body(mesh, settings, "mesh");
+    const MadeBody made = make_body(mesh, settings, "mesh", three);
+    ASSERT_EQ(made.body == nullptr, alone.body == nullptr);
+    if (!made.body) {
+      EXPECT_EQ(made.problems[0].message, alone.problems[0].message);
+      continue;
+    }
+    EXPECT_EQ(made.body->grid.begin, alone.body->grid.begin);
+    EXPECT_EQ(made.body->grid.values, alone.body->grid.values);
+    EXPECT_EQ(made.body->thickness, alone.body->thickness);
+    EXPECT_EQ(made.body->thinnest, alone.body->thinnest);
+    EXPECT_EQ(made.body->notes, alone.body->notes);
+  }
+}
+
 std::string fault(const BodyMesh& mesh) {
   const MadeBody made = make_body(mesh, {.reach = 1e-3}, "colliders[0].mesh");
   EXPECT_EQ(made.body == nullptr, !made.problems.empty());
@@ -93,11 +122,9 @@ TEST(Bodies, ThatEncloseNothingAreRefusedWithThePlace) {
   EXPECT_NE(fault(box_mesh({0.1, 0, 0.1})), "");
 }
 
-// A ball that is wrung flat across its lower half, and turned over below.
 TEST(Bodies, ThatAreInsideOutInAPartAreRefused) {
-  BodyMesh mesh = ball_mesh(0.1, 3);
-  for (Vector3d& v : mesh.vertices) v.x() *= (v.y() + 0.02) / 0.1;
-  EXPECT_NE(fault(mesh).find("inside out"), std::string::npos) << fault(mesh);
+  const std::string found = fault(wrung_ball());
+  EXPECT_NE(found.find("inside out"), std::string::npos) << found;
 }
 
 TEST(Bodies, AreMendedWhereTheirInsidesAreClear) {

@@ -11,6 +11,7 @@
 #include "core/contact/contact.h"
 #include "core/contact/moving_bodies.h"
 #include "tests/support/core/bodies.h"
+#include "tests/support/core/last_first.h"
 #include "tests/support/core/scenes.h"
 
 namespace weft::testing {
@@ -211,15 +212,6 @@ TEST(Poses, ThatAreFarAreSkippedWithoutMissingAContact) {
   }
 }
 
-// Three that come to their work in turn, the last one first.
-class LastFirst : public ThreadPool {
- public:
-  int threads() const override { return 3; }
-  void run(int parts, const std::function<void(int)>& part) override {
-    for (int i = parts; i-- > 0;) part(i);
-  }
-};
-
 Matrix3Xd run_leap(ThreadPool& pool = calling_thread(), bool with_snapshot = false) {
   const Scene scene = resting_on(leaping_ball(), 25);
   Simulation simulation(scene);
@@ -234,7 +226,7 @@ Matrix3Xd run_leap(ThreadPool& pool = calling_thread(), bool with_snapshot = fal
 }
 
 TEST(Poses, GiveTheSameBitsInVectorsOfEveryWidthOnSeveralThreadsAndAfterASnapshot) {
-  LastFirst three;
+  LastFirst three(3);
   const Matrix3Xd wanted = run_leap();
   EXPECT_EQ(run_leap(three), wanted);
   EXPECT_EQ(run_leap(calling_thread(), true), wanted);

@@ -9,6 +9,7 @@
 
 #include "core/contact/contact.h"
 #include "core/lattice/law.h"
+#include "tests/support/core/last_first.h"
 #include "tests/support/core/scenes.h"
 
 // The vector kernels are held to the plain solver, which evaluates one connection after the other.
@@ -182,15 +183,6 @@ void fill_with_nan(SweepState<T>& state, const LatticeLayout<T>& layout) {
         state.place(r, c)[plane] = std::numeric_limits<T>::quiet_NaN();
 }
 
-// Three threads that begin at the end.
-class BackwardCrew : public ThreadPool {
- public:
-  int threads() const override { return 3; }
-  void run(int parts, const std::function<void(int)>& part) override {
-    for (int i = parts - 1; i >= 0; --i) part(i);
-  }
-};
-
 // Every value of the lattice after some sweeps from fixed positions.
 template <class T>
 std::vector<T> swept(const SheetDefinition& sheet, bool poisoned, int bands = 1) {
@@ -200,7 +192,7 @@ std::vector<T> swept(const SheetDefinition& sheet, bool poisoned, int bands = 1)
   law.drift = {0, T(-1e-7), 0};
   law.wind = {true, {T(2), T(-1), T(4)}, T(1 / 6e-4), T(0.1), T(0.01)};
   State state(law.layout, law.compensated);
-  BackwardCrew pool;
+  LastFirst pool(3);
   if (poisoned) fill_with_nan(state, law.layout);
   const Matrix3Xd x = start_positions(sheet) + 0.01 * noise(sheet.particle_count());
   std::vector<T> out;
@@ -308,7 +300,7 @@ TEST(Repeatability, RunsHaveTheSameBitsHoweverManyHandsShareThem) {
   scene.colliders = {{"ball", Sphere{Vector3d(0.4, -0.2, 0.4), 0.2}, 0.3, {}}};
   Simulation alone(scene), shared(scene);
   EXPECT_EQ(shared.most_threads(), 3);
-  BackwardCrew pool;
+  LastFirst pool(3);
   for (int frame = 0; frame < 20; ++frame) {
     ASSERT_TRUE(alone.advance_frame());
     ASSERT_TRUE(shared.advance_frame(pool));

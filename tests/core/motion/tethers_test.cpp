@@ -5,11 +5,11 @@
 
 #include <array>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
 
 #include "core/triangles/geodesics.h"
+#include "tests/support/core/last_first.h"
 #include "tests/support/core/scenes.h"
 #include "tests/support/core/triangle_meshes.h"
 
@@ -223,18 +223,9 @@ TEST(Tethers, FromManyHeldParticlesAreInVectorsAsOneByOne) {
   }
 }
 
-// A pool that runs the last part first.
-class FourHands : public ThreadPool {
- public:
-  int threads() const override { return 4; }
-  void run(int parts, const std::function<void(int)>& part) override {
-    for (int i = parts; i-- > 0;) part(i);
-  }
-};
-
 TEST(Tethers, HaveTheSameBitsOnEveryProcessorAndHoweverManyHandsShareThem) {
   const Scene scene = hung_by(soft_sheet(132, 50), many_pins(132));
-  FourHands pool;
+  LastFirst pool(4);
   const std::uint64_t alone = hash_of(after_shaking(scene));
   EXPECT_EQ(hash_of(after_shaking(scene, pool)), alone);
   for (const std::int64_t target : {HWY_AVX2, HWY_AVX3, HWY_NEON}) {

@@ -14,6 +14,7 @@
 #include "core/simulation.h"
 #include "core/triangles/near_order.h"
 #include "core/triangles/triangles.h"
+#include "tests/support/core/last_first.h"
 #include "tests/support/core/scenes.h"
 #include "tests/support/core/triangle_meshes.h"
 
@@ -289,19 +290,6 @@ Scene falling(TriangleMesh mesh, const Feature& feature = kFeatures[0]) {
   return scene;
 }
 
-// Three or more threads that begin at the end.
-class BackwardCrew : public ThreadPool {
- public:
-  explicit BackwardCrew(int threads) : threads_(threads) {}
-  int threads() const override { return threads_; }
-  void run(int parts, const std::function<void(int)>& part) override {
-    for (int i = parts - 1; i >= 0; --i) part(i);
-  }
-
- private:
-  int threads_;
-};
-
 TEST(TriangleRepeatability, RunsHaveTheSameBitsOnEveryProcessorWithFma) {
   for (const Precision precision : {Precision::kSingle, Precision::kDouble}) {
     for (const Feature& feature : kFeatures) {
@@ -335,7 +323,7 @@ TEST(TriangleRepeatability, RunsHaveTheSameBitsHoweverManyHandsShareThem) {
   const Scene scene = falling(triangle_mesh(scattered(104, 0.004)));
   Simulation alone(scene), by_two(scene), by_five(scene);
   EXPECT_EQ(alone.most_threads(), 5);
-  BackwardCrew two(2), five(5);
+  LastFirst two(2), five(5);
   for (int frame = 0; frame < 12; ++frame) {
     ASSERT_TRUE(alone.advance_frame());
     ASSERT_TRUE(by_two.advance_frame(two));

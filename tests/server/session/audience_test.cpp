@@ -36,7 +36,7 @@ class AudienceTest : public ::testing::Test {
 
 TEST_F(AudienceTest, AReaderFindsEveryFrameOnceAndThenNone) {
   FrameReader reader{{}, 0, SlowReader::kDisconnect};
-  audience_.add(reader);
+  audience_.add(reader, now_);
   push(2);
   for (const int number : {0, 1, 2}) EXPECT_EQ(audience_.take_next(reader).frame->number, number);
   const auto found = audience_.take_next(reader);
@@ -46,8 +46,8 @@ TEST_F(AudienceTest, AReaderFindsEveryFrameOnceAndThenNone) {
 
 TEST_F(AudienceTest, ASlowReaderLosesFramesAndAViewSkipsThem) {
   FrameReader slow{{}, 0, SlowReader::kDisconnect}, view{{}, 0, SlowReader::kSkip};
-  audience_.add(slow);
-  audience_.add(view);
+  audience_.add(slow, now_);
+  audience_.add(view, now_);
   push(20);
   EXPECT_TRUE(audience_.take_next(slow).expired);
   const auto found = audience_.take_next(view);
@@ -57,7 +57,7 @@ TEST_F(AudienceTest, ASlowReaderLosesFramesAndAViewSkipsThem) {
 
 TEST_F(AudienceTest, AHolderMakesTheSessionWaitWhileHalfOfTheHistoryIsUnread) {
   FrameReader holder{{}, 0, SlowReader::kHoldSession};
-  audience_.add(holder);
+  audience_.add(holder, now_);
   while (!audience_.must_hold(now_)) push(1);
   EXPECT_EQ(audience_.latest(), 9);
   EXPECT_EQ(audience_.oldest(), 0);
@@ -71,7 +71,7 @@ TEST_F(AudienceTest, AHolderMakesTheSessionWaitWhileHalfOfTheHistoryIsUnread) {
 TEST_F(AudienceTest, TheLogIsToldWhatReadersMayWantAgain) {
   EXPECT_FALSE(audience_.limit_at(16, now_).history_from);
   FrameReader reader{{}, 0, SlowReader::kHoldSession};
-  audience_.add(reader);
+  audience_.add(reader, now_);
   EXPECT_FALSE(audience_.knows_holders({}, now_));
   push(5);
   PublishLimit limit = audience_.limit_at(16, now_);
@@ -87,19 +87,46 @@ TEST_F(AudienceTest, TheLogIsToldWhatReadersMayWantAgain) {
   EXPECT_EQ(audience_.limit_at(16, now_ + seconds(91)).history_from, 5);
 }
 
+// The log is told of it some time after it has come, and it reads meanwhile.
+TEST_F(AudienceTest, AReaderMayWantAllAgainThatItWasSentBeforeTheLogWasTold) {
+  push(9);
+  FrameReader early{{}, 2, SlowReader::kHoldSession}, late{{}, 8, SlowReader::kDisconnect};
+  audience_.add(late, now_);
+  audience_.add(early, now_);
+  read_up_to(9, early);
+  read_up_to(9, late);
+  EXPECT_EQ(audience_.limit_at(16, now_).history_from, 2);
+  EXPECT_EQ(audience_.limit_at(16, now_ + seconds(59)).history_from, 2);
+  EXPECT_EQ(audience_.limit_at(16, now_ + seconds(120)).history_from, 9);
+}
+
+TEST_F(AudienceTest, AfterARestartAReaderMayWantAllAgainFromWhereItCameBack) {
+  PublishLimit left;
+  left.readers = 2;
+  left.history_from = 1;
+  audience_.expect_back(left, now_ + seconds(30));
+  push(9);
+  FrameReader early{{}, 3, SlowReader::kDisconnect}, late{{}, 8, SlowReader::kDisconnect};
+  audience_.add(early, now_);
+  read_up_to(9, early);
+  EXPECT_EQ(audience_.limit_at(16, now_).history_from, 1);
+  audience_.add(late, now_);
+  EXPECT_EQ(audience_.limit_at(16, now_).history_from, 3);
+}
+
 TEST_F(AudienceTest, AfterARestartHoldersAreWaitedForUntilTheyComeOrTheTimeIsOver) {
   PublishLimit left;
   left.holders = left.readers = 1;
   left.history_from = 0;
-  audience_.expect_back(left, now_, now_ + seconds(30));
+  audience_.expect_back(left, now_ + seconds(30));
   push(9);
   EXPECT_TRUE(audience_.must_hold(now_));
   EXPECT_EQ(audience_.holds_until(now_), now_ + seconds(30));
   EXPECT_FALSE(audience_.must_hold(now_ + seconds(30)));
 
-  audience_.expect_back(left, now_, now_ + seconds(30));
+  audience_.expect_back(left, now_ + seconds(30));
   FrameReader holder{{}, 9, SlowReader::kHoldSession};
-  audience_.add(holder);
+  audience_.add(holder, now_);
   EXPECT_FALSE(audience_.must_hold(now_));
   EXPECT_EQ(audience_.limit_at(20, now_).holders, 1);
 }

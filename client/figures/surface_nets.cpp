@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "client/processors.h"
+
 namespace weft::client {
 namespace {
 
@@ -18,9 +20,10 @@ class NetLattice {
       size_[axis] = static_cast<int>(std::ceil((high[k] - low[k]) / cell)) + 1;
     }
     values_.resize(static_cast<std::size_t>(size_[0] * size_[1] * size_[2]));
-    for (int z = 0; z < size_[2]; z += kBlock)
+    on_all_processors(1 + (size_[2] - 1) / kBlock, [&](int layer) {
       for (int y = 0; y < size_[1]; y += kBlock)
-        for (int x = 0; x < size_[0]; x += kBlock) set_block(function, {x, y, z});
+        for (int x = 0; x < size_[0]; x += kBlock) set_block(function, {x, y, layer * kBlock});
+    });
     while (fill_gaps()) {
     }
   }

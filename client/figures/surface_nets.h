@@ -16,7 +16,8 @@ struct FigureMesh {
 
 // Where a function is 0 that is negative inside (surface nets: Gibson 1998), from values at the
 // corners of cubic cells; positive around, and nowhere more than twice the distance from there, by
-// which most corners are passed over. Gaps that a cell does not resolve are filled.
+// which most corners are passed over. Gaps that a cell does not resolve are filled. The function is
+// called by several threads at once.
 FigureMesh surface_of(const std::function<double(const Vector3d&)>& function, const Vector3d& low,
                       const Vector3d& high, double cell);
 

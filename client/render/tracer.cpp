@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -12,10 +11,10 @@
 #include <numbers>
 #include <optional>
 #include <stdexcept>
-#include <thread>
 
 #include "client/page/page.h"
 #include "client/problem.h"
+#include "client/processors.h"
 
 namespace weft::client {
 namespace {
@@ -441,30 +440,22 @@ Tracer::~Tracer() = default;
 void Tracer::draw(const Camera& camera, Picture& picture, const Area& area,
                   const std::stop_token& stop) const {
   const Vector3f from = rays_->local(camera.place);
-  std::atomic<int> next_row = 0;
-  const auto draw_rows = [&] {
-    for (int row = next_row++; row < area.height && !stop.stop_requested(); row = next_row++) {
-      for (int column = 0; column < area.width; ++column) {
-        const auto pixel =
-            mixed(static_cast<std::uint32_t>(row) << 16 | static_cast<std::uint32_t>(column));
-        Colour sum = Colour::Zero();
-        for (std::uint32_t i = 0; i < kSamples; ++i) {
-          Sample sample(pixel, i);
-          const Pair place = sample.next();
-          const double x = 2 * (column + double{place.x}) / area.width - 1;
-          const double y = 1 - 2 * (row + double{place.y}) / area.height;
-          sum += rays_->seen(from, camera.ray(x, y).cast<float>(), sample).min(1);
-        }
-        picture.set(area.x + column, area.y + row, sum / kSamples);
+  on_all_processors(area.height, [&](int row) {
+    if (stop.stop_requested()) return;
+    for (int column = 0; column < area.width; ++column) {
+      const auto pixel =
+          mixed(static_cast<std::uint32_t>(row) << 16 | static_cast<std::uint32_t>(column));
+      Colour sum = Colour::Zero();
+      for (std::uint32_t i = 0; i < kSamples; ++i) {
+        Sample sample(pixel, i);
+        const Pair place = sample.next();
+        const double x = 2 * (column + double{place.x}) / area.width - 1;
+        const double y = 1 - 2 * (row + double{place.y}) / area.height;
+        sum += rays_->seen(from, camera.ray(x, y).cast<float>(), sample).min(1);
       }
+      picture.set(area.x + column, area.y + row, sum / kSamples);
     }
-  };
-  {
-    std::vector<std::jthread> threads;
-    for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i)
-      threads.emplace_back(draw_rows);
-    draw_rows();
-  }
+  });
   if (stop.stop_requested()) throw interrupted();
 }
 

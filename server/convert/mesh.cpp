@@ -86,7 +86,6 @@ void check_size(const std::string& bytes, std::size_t unit, const std::string& f
 // A sixteenth of the memory is for bodies that may be asked for again.
 MadeBody shared_body(const v1::MeshData& from, const BodySettings& settings,
                      const std::string& field, Scheduler* scheduler) {
-  constexpr int kMostThreads = 16;
   static BakedBodies bodies(static_cast<std::size_t>(memory_there_is() / 16));
   const std::string_view positions = positions_of(from);
   const std::string key = std::string(positions) + from.triangles() +
@@ -95,7 +94,7 @@ MadeBody shared_body(const v1::MeshData& from, const BodySettings& settings,
   return bodies.get(key, [&] {
     BodyMesh mesh{points_of<Vector3d>(positions), triangles_of(from.triangles())};
     if (scheduler == nullptr) return make_body(std::move(mesh), settings, field);
-    IdleThreads pool(*scheduler, kMostThreads);
+    IdleThreads pool(*scheduler, scheduler->threads());
     return make_body(std::move(mesh), settings, field, pool);
   });
 }

@@ -5,8 +5,8 @@
 
 namespace weft {
 
-Scheduler::Scheduler(int threads) {
-  for (int i = 0; i < std::max(1, threads); ++i) threads_.emplace_back([this] { work(); });
+Scheduler::Scheduler(int threads) : count_(std::max(1, threads)) {
+  for (int i = 0; i < count_; ++i) threads_.emplace_back([this] { work(); });
 }
 
 Scheduler::~Scheduler() { stop(); }

@@ -49,6 +49,8 @@ class Scheduler {
   explicit Scheduler(int threads);
   ~Scheduler();  // stops
 
+  int threads() const { return count_; }
+
   // Lets the task run a slice soon, after the one it is in, if any.
   void wake(const std::shared_ptr<Task>& task);
 
@@ -100,6 +102,7 @@ class Scheduler {
   std::multimap<Clock::time_point, std::shared_ptr<Task>> waiting_;  // by due time
   std::atomic<Clock::rep> next_due_ = kNever;                        // of waiting_
   bool stopping_ = false;
+  const int count_;  // of threads
   std::vector<std::jthread> threads_;
 };
 

@@ -23,6 +23,7 @@ void Audience::add(FrameReader& reader, Time now) {
   if (reader.policy == SlowReader::kHoldSession && absent_holders_ && --absent_holders_->count == 0)
     absent_holders_.reset();
   if (absent_readers_ > 0) --absent_readers_;
+  // a last mark that is no farther holds for as long
   if (!read_marks_.empty() && read_marks_.back().next <= reader.next) return;
   while (!read_marks_.empty() && read_marks_.back().next >= reader.next) read_marks_.pop_back();
   read_marks_.push_back({now, reader.next});

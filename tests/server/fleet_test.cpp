@@ -1,22 +1,13 @@
-#include <algorithm>
 #include <chrono>
-#include <csignal>
 #include <fstream>
-#include <future>
-#include <pqxx/pqxx>
-#include <sstream>
-#include <stdexcept>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "server/store/assets.h"
-#include "server/store/postgres_connection.h"
 #include "server/store/records.h"
-#include "server/store/store.h"
+#include "tests/server/fleet_support.h"
 #include "tests/support/service/assets.h"
-#include "tests/support/service/postgres.h"
-#include "tests/support/service/process.h"
-#include "tests/support/service/service.h"
-#include "tests/support/temporary_directory.h"
 
 // libpqxx 6.4 loses the answer to what it sends on a connection that turns out to be broken.
 extern "C" const char* __lsan_default_suppressions();
@@ -27,146 +18,9 @@ namespace {
 
 using ::testing::Each;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::SizeIs;
 using Sessions = Service::Sessions;
 using std::chrono::milliseconds, std::chrono::seconds;
-
-// weftd in a process of its own, which can be killed and frozen.
-class Replica {
- public:
-  Replica(const std::string& database, const std::string& name) {
-    process_.emplace("weftd",
-                     std::vector<std::string>{"--port=0", "--database=" + database,
-                                              "--replica=" + name, "--metrics=none"},
-                     output_.path("weftd.txt"));
-    const std::string listening = "weftd listening on ";
-    std::string text;
-    while (text.find(listening) == std::string::npos || !text.ends_with('\n')) {
-      std::this_thread::sleep_for(milliseconds(2));
-      std::ostringstream all;
-      all << std::ifstream(output_.path("weftd.txt")).rdbuf();
-      text = all.str();
-    }
-    const std::size_t begin = text.find(listening) + listening.size();
-    const std::string address = text.substr(begin, text.find('\n', begin) - begin);
-    sessions_ = v1::SessionService::NewStub(
-        grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
-  }
-
-  template <class Request, class Response>
-  grpc::Status call(grpc::Status (Sessions::*method)(grpc::ClientContext*, const Request&,
-                                                     Response*),
-                    const Request& request, Response* response,
-                    seconds longest = seconds(60)) const {
-    grpc::ClientContext context;
-    context.set_wait_for_ready(true);
-    context.set_deadline(std::chrono::system_clock::now() + longest);
-    return (sessions_.get()->*method)(&context, request, response);
-  }
-
-  v1::Session create(const std::string& id) const {
-    v1::CreateSessionRequest request;
-    request.set_session_id(id);
-    *request.mutable_session()->mutable_scene() = small_scene();
-    v1::Session session;
-    EXPECT_TRUE(call(&Sessions::CreateSession, request, &session).ok());
-    return session;
-  }
-  void step(const v1::Session& session, std::int64_t frames) const {
-    v1::StepSessionRequest request;
-    request.set_name(session.name());
-    request.set_frames(frames);
-    v1::StepSessionResponse response;
-    EXPECT_TRUE(call(&Sessions::StepSession, request, &response).ok());
-  }
-
-  void kill() {
-    process_->signal(SIGKILL);
-    process_->wait();
-    process_.reset();
-  }
-  void freeze() const { process_->signal(SIGSTOP); }
-  void thaw() const { process_->signal(SIGCONT); }
-
- private:
-  TemporaryDirectory output_;
-  std::optional<Process> process_;
-  std::unique_ptr<v1::SessionService::Stub> sessions_;
-};
-
-// Servers that share a database.
-class Fleet : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (!Postgres::is_installed()) GTEST_SKIP() << "no PostgreSQL";
-    database_ = std::make_unique<Postgres>();
-  }
-
-  ServerOptions options(const std::string& name) const {
-    ServerOptions options = Service::in_process();
-    options.database = database_->url();
-    options.replica = name;
-    options.snapshot_ms = snapshot_ms_;
-    return options;
-  }
-  std::unique_ptr<Service> server(const std::string& name) const {
-    return std::make_unique<Service>(options(name));
-  }
-  Replica replica(const std::string& name) const { return {database_->url(), name}; }
-
-  static Error get_error(Service& service, const v1::Session& session) {
-    v1::GetSessionRequest request;
-    request.set_name(session.name());
-    return service.error(&Sessions::GetSession, request);
-  }
-  // Asks until the server has taken the session over, and is where the other one was.
-  static v1::Session insist(Service& service, const v1::Session& session) {
-    const auto ask_later = [] { std::this_thread::sleep_for(milliseconds(5)); };
-    while (get_error(service, session).reason() == "WRONG_REPLICA") ask_later();
-    while (service.get(session).state() == v1::SESSION_STATE_RESTORING) ask_later();
-    return service.get(session);
-  }
-
-  static void set_preset(Service& service, const v1::Session& session, const std::string& preset) {
-    v1::UpdateTextileRequest request;
-    request.set_name(session.name());
-    request.mutable_textile()->set_preset(preset);
-    ASSERT_EQ(service.error(&Sessions::UpdateTextile, request).code, grpc::StatusCode::OK);
-  }
-
-  static std::vector<v1::Frame> frames(Service& service, const v1::Session& session,
-                                       std::int64_t last, std::int64_t first = 0) {
-    return Stream(service, frames_of(session, first, last)).rest();
-  }
-  static void expect_equal(const std::vector<v1::Frame>& found,
-                           const std::vector<v1::Frame>& wanted) {
-    ASSERT_EQ(found.size(), wanted.size());
-    for (std::size_t i = 0; i < found.size(); ++i)
-      ASSERT_TRUE(found[i].SerializeAsString() == wanted[i].SerializeAsString()) << "frame " << i;
-  }
-  // Of a session of its own that nothing disturbed.
-  static std::vector<v1::Frame> undisturbed(Service& service, std::int64_t last) {
-    const v1::Session session = service.create();
-    service.step(session, last);
-    return frames(service, session, last);
-  }
-
-  std::int64_t count(const std::string& query) const {
-    pqxx::connection connection(database_->url());
-    pqxx::work transaction(connection);
-    return transaction.exec1(query)[0].as<std::int64_t>();
-  }
-  void change(const std::string& statement) const {
-    pqxx::connection connection(database_->url());
-    pqxx::work transaction(connection);
-    transaction.exec(statement);
-    transaction.commit();
-  }
-
-  int snapshot_ms_ = 2000;
-  std::unique_ptr<Postgres> database_;
-};
 
 TEST_F(Fleet, HasASessionOnOneServerWhichTheOthersName) {
   const auto a = server("a"), b = server("b");
@@ -300,54 +154,6 @@ TEST_F(Fleet, LetsAnOldOwnerWriteNothing) {
   expect_equal(frames(*b, session, 20), undisturbed(*b, 20));
 }
 
-// Where it hangs is chance: here, where it has locked a session and not said what becomes of it.
-TEST_F(Fleet, TakesASessionFromAServerThatHangsInATransaction) {
-  Replica a = replica("a");
-  const auto b = server("b");
-  const v1::Session session = a.create("curtain");
-  a.step(session, 5);
-
-  PostgresConnection of_a(database_->url());
-  of_a.run([](pqxx::work&) {});
-  std::promise<void> locked, taken;
-  int times = 0;
-  std::jthread hanging([&] {
-    of_a.run([&](pqxx::work& transaction) {
-      transaction.exec("UPDATE weft.session SET epoch = epoch");
-      if (++times > 1) return;
-      locked.set_value();
-      taken.get_future().wait();
-      transaction.exec("UPDATE weft.session SET epoch = epoch");
-    });
-  });
-  locked.get_future().wait();
-  a.kill();
-  EXPECT_EQ(insist(*b, session).frame(), 5);
-  taken.set_value();
-  hanging.join();
-  EXPECT_EQ(times, 2) << "done again on another connection";
-  b->step(session, 5);
-  expect_equal(frames(*b, session, 10), undisturbed(*b, 10));
-}
-
-TEST_F(Fleet, GoesOnWithOtherSessionsWhileOneIsLocked) {
-  Replica a = replica("a");
-  const auto b = server("b");
-  const v1::Session locked = a.create("curtain"), other = a.create("flag");
-  pqxx::connection stranger(database_->url());
-  auto lock = std::make_unique<pqxx::work>(stranger);
-  lock->exec("UPDATE weft.session SET epoch = epoch WHERE id = 'curtain'");
-  a.kill();
-  const Error error = get_error(*b, locked);
-  EXPECT_EQ(error.reason(), "STORE_UNREACHABLE");
-  EXPECT_THAT(error.message, HasSubstr("lock timeout"));
-  EXPECT_EQ(insist(*b, other).replica(), "b");
-  lock->abort();
-  while (get_error(*b, locked).reason() == "STORE_UNREACHABLE") {
-  }
-  EXPECT_EQ(insist(*b, locked).replica(), "b");
-}
-
 TEST_F(Fleet, TellsStreamsOfAnOldOwnerThatTheSessionIsElsewhere) {
   const auto a = server("a"), b = server("b");
   const v1::Session session = a->create();
@@ -438,71 +244,6 @@ TEST_F(Fleet, KeepsSnapshotsOnDemandForEveryServer) {
   EXPECT_EQ(newest(other), newest(session));
 }
 
-TEST_F(Fleet, MovesNoSessionWhenAServerComesOrTheDatabaseIsRestarted) {
-  const auto a = server("a"), b = server("b");
-  for (int i = 0; i < 5; ++i) a->create();
-  const auto c = server("c");
-  database_->restart();
-  const auto asked = [&] {
-    v1::Session nobodys;
-    nobodys.set_name("sessions/nobodys");
-    return get_error(*c, nobodys).code;
-  };
-  while (asked() != grpc::StatusCode::NOT_FOUND) std::this_thread::sleep_for(milliseconds(5));
-  std::this_thread::sleep_for(seconds(4));  // longer than a lease
-  EXPECT_EQ(a->info().sessions(), 5);
-  EXPECT_EQ(b->info().sessions() + c->info().sessions(), 0);
-}
-
-TEST_F(Fleet, SimulatesOnAndLetsChangesWaitWhileTheDatabaseIsAway) {
-  const auto a = server("a");
-  const v1::Session session = a->create(), other = a->create();
-  Stream stream(*a, frames_of(session));
-  v1::RunSessionRequest run;
-  run.set_name(session.name());
-  run.set_time_scale(1);
-  ASSERT_EQ(a->error(&Sessions::RunSession, run).code, grpc::StatusCode::OK);
-  while (stream.frame().number() < 60) {  // the log then knows its pace
-  }
-  database_->stop();
-  const std::int64_t stopped = a->get(session).frame();
-  while (stream.frame().number() < stopped + 20) {
-  }
-  v1::Session nobodys;
-  nobodys.set_name("sessions/nobodys");
-  EXPECT_EQ(get_error(*a, nobodys).reason(), "STORE_UNREACHABLE");
-  std::jthread caller([&] { set_preset(*a, other, "denim_11oz"); });
-  database_->start();
-  caller.join();
-  EXPECT_EQ(count("SELECT count(*) FROM weft.entry"), 2);
-}
-
-TEST_F(Fleet, RefusesWhatTheDatabaseRefusesAndGoesOn) {
-  const auto a = server("a");
-  const v1::Session session = a->create();
-  change("ALTER TABLE weft.entry ADD CHECK (false) NOT VALID");
-  v1::StepSessionRequest step;
-  step.set_name(session.name());
-  const Error error = a->error(&Sessions::StepSession, step);
-  EXPECT_EQ(error.reason(), "STORE_UNWRITABLE") << error.message;
-  change("ALTER TABLE weft.entry DROP CONSTRAINT entry_check");
-  a->step(session, 3);
-  EXPECT_EQ(count("SELECT max(number) FROM weft.entry"), 0);
-}
-
-TEST_F(Fleet, NamesASessionWhoseDataIsDamaged) {
-  auto a = server("a");
-  const v1::Session session = a->create();
-  a->step(session, 3);
-  a.reset();
-  change("UPDATE weft.entry SET checksum = checksum + 1");
-  const auto b = server("b");
-  while (get_error(*b, session).reason() == "WRONG_REPLICA") std::this_thread::yield();
-  EXPECT_EQ(get_error(*b, session).code, grpc::StatusCode::DATA_LOSS);
-  b->erase(session);
-  EXPECT_EQ(get_error(*b, session).code, grpc::StatusCode::NOT_FOUND);
-}
-
 TEST_F(Fleet, TellsNobodyWhereTheSessionsOfOthersAre) {
   const TemporaryDirectory directory;
   std::ofstream(directory.path("tokens"))  // SHA-256 of "a1" and "b1"
@@ -573,36 +314,6 @@ TEST_F(Fleet, GoesOnWithASessionThatNamesAnAsset) {
   expect_equal(frames(*b, session, 10), before);
   b->erase(session);
   EXPECT_EQ(delete_asset(*b->assets, name).code, grpc::StatusCode::OK);
-}
-
-TEST_F(Fleet, OpensADatabaseThatHadNoAssets) {
-  auto a = server("a");
-  const v1::Session session = a->create();
-  a.reset();
-  change("DROP TABLE weft.asset_use, weft.asset_piece, weft.asset");
-  change("UPDATE weft.version SET number = 1");
-  const auto b = server("b");
-  EXPECT_EQ(insist(*b, session).uid(), session.uid());
-  EXPECT_EQ(upload(*b->assets, square_mesh(2).SerializeAsString()).second.code,
-            grpc::StatusCode::OK);
-}
-
-TEST_F(Fleet, SaysWhatIsWrongWithADatabase) {
-  const auto refusal = [](const std::string& url) {
-    try {
-      open_postgres_store(url, "a")->load();
-    } catch (const StoreError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
-  EXPECT_THAT(refusal("postgres:/nowhere"), HasSubstr("names no PostgreSQL database"));
-  const std::string away = refusal("host=/nowhere dbname=weft password=secret");
-  EXPECT_THAT(away, HasSubstr("PostgreSQL at /nowhere:5432/weft cannot be reached"));
-  EXPECT_THAT(away, ::testing::Not(HasSubstr("secret")));
-  server("a").reset();
-  change("UPDATE weft.version SET number = 99");
-  EXPECT_THAT(refusal(database_->url()), HasSubstr("version 99"));
 }
 
 }  // namespace

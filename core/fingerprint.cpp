@@ -77,6 +77,22 @@ Scene dressed_scene() {
   return scene;
 }
 
+// A swatch that falls onto another as fast as windows of contact are shortened for.
+Scene fallen_scene() {
+  Scene scene;
+  for (const double height : {0.0, 3.5e-3}) {
+    SheetDefinition& sheet = scene.sheets.emplace_back(rough_sheet(Grid{3, 5, 0.01}, Isometric{}));
+    sheet.pins.clear();
+    for (std::size_t i = 1; i < sheet.start_positions.size(); i += 3) {
+      sheet.start_positions[i] += height;
+      sheet.start_velocities.insert(sheet.start_velocities.end(), {0, height > 0 ? -4.0 : 0, 0});
+    }
+  }
+  scene.cloth_contact = true;
+  scene.solver.frame_step = 1e-3;
+  return scene;
+}
+
 }  // namespace
 
 std::uint64_t fingerprint() {
@@ -108,7 +124,8 @@ std::uint64_t fingerprint() {
   Scene fine = dressed;
   fine.solver = default_settings(Accuracy::kFine);
   fine.solver.frame_step = dressed.solver.frame_step;
-  for (const Scene& scene : {single, twofold, plain, tethered, draft, dressed, fine}) {
+  for (const Scene& scene :
+       {single, twofold, plain, tethered, draft, dressed, fine, fallen_scene()}) {
     Simulation simulation(scene);
     std::vector<double> x(3 * static_cast<std::size_t>(simulation.particle_count()));
     for (int frame = 0; frame < 4; ++frame) {

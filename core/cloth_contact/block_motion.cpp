@@ -1,7 +1,6 @@
 #include "core/cloth_contact/block_motion.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 
@@ -50,20 +49,11 @@ void BlockMotion::box_ways(ThreadPool& pool) {
 }
 
 void BlockMotion::set(const Matrix3Xd& from, const Matrix3Xd& to, ThreadPool& pool) {
-  rounding_ = 1e-12;
   by_.resize(4, to.cols());
   for_shares(pool, to.cols(), kParticlesOfShare, [&](Eigen::Index begin, Eigen::Index end) {
     for (Eigen::Index i = begin; i < end; ++i)
       by_.col(i) << (to.col(i) - from.col(i)).cast<float>(), 0;
   });
-  box_ways(pool);
-}
-
-void BlockMotion::set(const Places& from, const Places& to, ThreadPool& pool) {
-  constexpr double kEach = 4 * 0x1p-24;  // of two places and their difference
-  const float farthest = std::max(from.cwiseAbs().maxCoeff(), to.cwiseAbs().maxCoeff());
-  rounding_ = 4 * std::sqrt(3.0) * kEach * double{farthest};
-  by_ = to - from;
   box_ways(pool);
 }
 

@@ -15,7 +15,6 @@ class BlockMotion {
 
   // (3 x particles) m
   void set(const Matrix3Xd& from, const Matrix3Xd& to, ThreadPool& pool);
-  void set(const Places& from, const Places& to, ThreadPool& pool);
   void forget();
 
   // How far what is in two nodes, or blocks, moved in relation to each other, at most, m: what both
@@ -23,13 +22,13 @@ class BlockMotion {
   double between(int one, int other) const {
     const Box &a = box_[static_cast<std::size_t>(one)], &b = box_[static_cast<std::size_t>(other)];
     const Eigen::Array4f sides = a.high.max(b.high) - a.low.min(b.low);
-    return kOfRounding * double{sides.matrix().norm()} + rounding_;
+    return kOfRounding * double{sides.matrix().norm()} + kRounding;
   }
-  // What rounding of places adds to that, m.
-  double rounding() const { return rounding_; }
+  // The same of any two, m.
+  double most() const { return between(1, 1); }
 
  private:
-  static constexpr double kOfRounding = 1 + 1e-6;
+  static constexpr double kOfRounding = 1 + 1e-6, kRounding = 1e-12;
   struct Box {
     Eigen::Array4f low, high;
   };
@@ -39,7 +38,6 @@ class BlockMotion {
   std::vector<int> joined_;  // nodes with halves, after these
   std::vector<Box> box_;     // of each node
   Places by_;                // m
-  double rounding_ = 0;      // m
 };
 
 }  // namespace weft

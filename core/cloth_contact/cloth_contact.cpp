@@ -13,8 +13,9 @@ constexpr double kMotionRounding = 1.001;  // of motion as solvers tell it
 // Of a window, s: what lies at rest falls and is lifted again within it, by less than a micrometre;
 // in windows of a millisecond cloth bounced by 20, and slid where friction should have held it.
 constexpr double kWindowTime = 2.5e-4;
-// of the thickest cloth: what comes in a window at most, and what is not looked at closer
-constexpr double kWindowReach = 0.5, kLeastReach = 0.02;
+// of the thickest cloth: what comes in a window at most, where nothing has met in its frame yet,
+// and what is not looked at closer
+constexpr double kWindowReach = 0.5, kReachUnmet = 1.0, kLeastReach = 0.02;
 constexpr double kSpare = 1.25;  // where steps are faster than the ones before
 
 // Of windows.
@@ -45,7 +46,6 @@ void ClothContact::forget_motion() {
   near_ = {};
   separation_ = {};
   begin_ = x_ = d_ = {};
-  about_ = {};
   own_x_ = own_d_ = {};
   window_ = {};
   come_ = moved_ = 0;
@@ -78,23 +78,6 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
     act(sheets, ends_frame, pool);
   }
   if (ends_frame) separation_.forget_given();
-  if (lists_.empty()) look_ahead(sheets, in_step, pool);
-}
-
-// Where nothing was near that may last as far as the next window goes.
-void ClothContact::look_ahead(std::span<const MovingSheet> sheets, double in_step,
-                              ThreadPool& pool) {
-  constexpr double kFaster = 1.1;  // the next step
-  const double come = in_step + kSpare * reach(in_step);
-  if (scene_.solver.plain || lists_.lasts() < 0 || moved_ + come_ + come <= lists_.lasts()) return;
-  about_.resize(4, cloth_.particles());
-  about_.row(3).setZero();
-  for (std::size_t s = 0; s < sheets.size(); ++s) {
-    sheets[s].solver->positions(own_x_);
-    about_.block(0, cloth_.first_particle[s], 3, own_x_.cols()) = own_x_.cast<float>();
-  }
-  lists_.look(about_, kFaster * come, pool);
-  moved_ = come_ = 0;
 }
 
 void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step, ThreadPool& pool) {
@@ -111,17 +94,14 @@ void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step, T
     begin_.middleCols(from, to - from) =
         x_.middleCols(from, to - from) - d_.middleCols(from, to - from);
   });
-  if (scene_.solver.plain || !lists_.empty()) return;
-  // nothing was near: that may last
-  lists_.expect(begin_, window_.most_come, pool);
-  moved_ = 0;
-  window_.is_known = !lists_.empty();
 }
 
 // Of the motion in a window whose steps are like one, m.
 double ClothContact::reach(double in_step) const {
   const double all = share_of(scene_.solver) * cloth_.thickest;
-  return std::clamp(kSpare * window_.most_steps * in_step, kLeastReach * all, kWindowReach * all);
+  const bool meets = has_met_ || !untangling_.empty();
+  return std::clamp(kSpare * window_.most_steps * in_step, kLeastReach * all,
+                    (meets ? kWindowReach : kReachUnmet) * all);
 }
 
 // What may have met in the window.

@@ -19,9 +19,7 @@ namespace weft {
 // is near; a window ends with its frame at the latest, so frames can be gone on from. Where it ends
 // it is known how far everything came, and so what may have met, but where nothing was near enough
 // to begin with. A step in which something comes farther than was foreseen for its window begins a
-// window of its own. What comes of it does not depend on lists, nor on who computes them. Where
-// nothing was near, it is seen from rough positions at the end of a window that the next may pass
-// unseen.
+// window of its own. What comes of it does not depend on lists, nor on who computes them.
 class ClothContact {
  public:
   // Holds on to the scene.
@@ -69,7 +67,6 @@ class ClothContact {
   void begin_window(std::span<MovingSheet> sheets, double in_step, ThreadPool& pool);
   void act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPool& pool);
   void find_near(ThreadPool& pool);
-  void look_ahead(std::span<const MovingSheet> sheets, double in_step, ThreadPool& pool);
   void read(std::span<MovingSheet> sheets, ThreadPool& pool);
   void write(std::span<MovingSheet> sheets);
   Matrix3Xd good_positions(std::span<const MovingSheet> sheets) const;
@@ -91,7 +88,6 @@ class ClothContact {
 
   std::vector<double> inverse_mass_;  // of all particles, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m
-  Places about_;                      // now
   Matrix3Xd own_x_, own_d_;           // of a sheet, m
   Separation separation_;
   Untangling untangling_;

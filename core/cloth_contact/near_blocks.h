@@ -50,7 +50,6 @@ class NearBlocks {
   int number(int block) const { return number_[static_cast<std::size_t>(block)]; }
   // From now on cloth is at x, (3 x particles) m, which outlives what is asked.
   void set(const Matrix3Xd& x, ThreadPool& pool = calling_thread());
-  const Places& places() const { return about_; }
   // Two blocks, or a block and itself, whose boxes are no farther apart than `reach`, m, along any
   // axis; in ascending order.
   std::vector<BlockPair> meet(double reach);
@@ -72,14 +71,7 @@ class NearBlocks {
   // takes a closer look. The closest is not looked for where it is `enough`.
   // Threads may ask at the same time.
   double distance(const BlockPair& blocks, double enough = 0);
-  // The same of all blocks of two nodes, or of one, m.
-  double distance(const Node& one, const Node& other, double enough) {
-    box_node(one);
-    box_node(other);
-    const double between = gap(box(one), box(other));
-    return between >= enough ? between : std::max(between, distance_if_flat(one, other));
-  }
-  // 0 where they do not lie flat together, m.
+  // The same of all blocks of two nodes, or of one; 0 where they do not lie flat together, m.
   double distance_if_flat(const Node& one, const Node& other) {
     constexpr int kMost = 64;  // blocks
     if (one.count() + other.count() > kMost) return 0;

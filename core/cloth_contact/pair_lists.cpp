@@ -14,6 +14,22 @@ std::span<T> part_of(std::vector<T>& all, std::int64_t begin, std::int64_t end) 
                                 static_cast<std::size_t>(end - begin));
 }
 
+// Numbers of three points that are far from each other and from a line.
+std::array<Eigen::Index, 3> far_corners(const Matrix3Xd& at) {
+  const auto farthest = [&](const auto& squared) {
+    Eigen::Index number = 0;
+    squared.maxCoeff(&number);
+    return number;
+  };
+  const Eigen::Index one = farthest((at.colwise() - at.rowwise().mean()).colwise().squaredNorm());
+  const Matrix3Xd ways = at.colwise() - at.col(one);
+  const Eigen::Index other = farthest(ways.colwise().squaredNorm());
+  const Vector3d along = ways.col(other).normalized();
+  const Eigen::Index out =
+      farthest((ways - along * (along.transpose() * ways)).colwise().squaredNorm());
+  return {one, other, out};
+}
+
 }  // namespace
 
 PairLists::PairLists(const Cloth& cloth)
@@ -21,7 +37,6 @@ PairLists::PairLists(const Cloth& cloth)
 
 void PairLists::forget() {
   before_ = {};
-  before_about_ = {};
   states_ = {};
   lists_ = decltype(lists_)();
   apart_ = reopened_ = {};
@@ -32,26 +47,18 @@ void PairLists::forget() {
 }
 
 void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& pool) {
-  in_window_.set(from, now, pool);
-  look(
-      from, [&](int one, int other) { return length(in_window_.between(one, other)); }, 0, pool);
-}
-
-void PairLists::expect(const Matrix3Xd& from, double come, ThreadPool& pool) {
-  // when it does not hold any more much else will soon not
-  look(
-      from, [&](int, int) { return length(come); }, 0.5 * cloth_.thickest, pool);
-}
-
-// came(one, other): how far two nodes come in relation to each other in the window, m. What holds
-// for less than `spare` beyond that is made anew, too, m.
-template <class Came>
-void PairLists::look(const Matrix3Xd& x, const Came& came, double spare, ThreadPool& pool) {
   constexpr std::int64_t kLeastShare = 1024, kLeastCloser = 8;  // of a thread
-  blocks_.set(x, pool);
+  constexpr double kSlow = 0.3, kSpare = 1.5;                   // of the thickest cloth
+  ++updates_;
+  in_window_.set(from, now, pool);
+  // Where all is slow and nothing near, what holds for less than that beyond the window is made
+  // anew, too: then all holds for some windows.
+  const double spare =
+      near_ == 0 && in_window_.most() < kSlow * cloth_.thickest ? kSpare * cloth_.thickest : 0;
+  blocks_.set(from, pool);
   std::vector<std::size_t> closer;  // of apart_
   if (before_.cols() > 0) {
-    since_.set(before_, x, pool);
+    since_.set(before_, from, pool);
     for_shares(pool, std::ssize(states_), kLeastShare, [&](std::int64_t begin, std::int64_t end) {
       for (State& state : part_of(states_, begin, end)) {
         const double by = since_.between(number(state.blocks.one), number(state.blocks.other));
@@ -69,9 +76,8 @@ void PairLists::look(const Matrix3Xd& x, const Came& came, double spare, ThreadP
     };
     closer = find_in_shares<std::size_t>(pool, std::ssize(apart_), kLeastShare, find_closer);
   }
-  meet(came, spare, closer);
-  before_ = x;
-  before_about_ = blocks_.places();
+  meet(spare, closer);
+  before_ = from;
 
   const auto is_due = [&](const State& state) {
     return !(state.left >= state.came + spare) ||
@@ -90,7 +96,7 @@ void PairLists::look(const Matrix3Xd& x, const Came& came, double spare, ThreadP
   run_shares(pool, shares, std::ssize(due),
              [&](std::size_t share, std::int64_t begin, std::int64_t end) {
                for (const std::size_t k : part_of(due, begin, end))
-                 look_closer(x, spare, scratch_[share], states_[k], *lists_[k]);
+                 look_closer(from, spare, scratch_[share], states_[k], *lists_[k]);
              });
 
   lasts_ = kMostMotion * cloth_.thickest;
@@ -108,76 +114,40 @@ void PairLists::look_closer(const Matrix3Xd& x, double spare, Scratch& scratch, 
                             List& list) {
   const double thickest = cloth_.thickest, comes = state.came;
   if (!(state.left >= comes + spare))
-    renew(x, least_left(comes),
-          std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + 3 * spare, scratch,
-          state, list);
+    renew(x, least_left(comes) + spare,
+          std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + spare, scratch, state,
+          list);
   if (state.has_some && !(state.near_left >= comes + spare / 2))
     prune(x,
           comes + (spare > 0 ? spare / 2 : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
           state, list);
 }
 
-void PairLists::look(const Places& now, double come, ThreadPool& pool) {
-  constexpr std::size_t kShare = 8;  // of all: more are looked at anew together
-  since_.set(before_about_, now, pool);
-  const double rounding = since_.rounding();
-  const std::size_t most = (states_.size() + apart_.size()) / kShare;
-  std::size_t closer = 0;
-  const auto look_closer = [&] {
-    if (closer++ > 0) return closer <= most;
-    now_all_ = now.topRows<3>().cast<double>();
-    blocks_.set(now_all_, pool);
-    return true;
-  };
-  lasts_ = kMostMotion * cloth_.thickest;
-  for (std::size_t k = 0; k < states_.size() && lasts_ >= come; ++k) {
-    const State& state = states_[k];
-    const double by = since_.between(number(state.blocks.one), number(state.blocks.other));
-    double left = (state.has_some ? state.near_left : state.left) - by;
-    if (left < come && look_closer())
-      left = left_at(now_all_, state, *lists_[k], state.left - by, come + rounding) - rounding;
-    lasts_ = std::min(lasts_, left);
-  }
-  for (std::size_t k = 0; k < apart_.size() && lasts_ >= come; ++k) {
-    const auto& [one, other, left_then] = apart_[k];
-    double left = left_then - since_.between(one.number, other.number);
-    if (left < come && look_closer())
-      left = blocks_.distance(one, other, cloth_.thickest + come + rounding) - cloth_.thickest -
-             rounding;
-    lasts_ = std::min(lasts_, left);
-  }
-  // what was not looked at may be nearer still
-  if (lasts_ < come) lasts_ = 0;
-}
-
-// Of a list without any that are near: how far its pairs may come at x until some are, m. `left`:
-// at least, of all it has. Looks for no more than `enough`.
-double PairLists::left_at(const Matrix3Xd& x, const State& state, const List& list, double left,
-                          double enough) {
-  if (list.made_at.cols() == 0)
-    return blocks_.distance(state.blocks, cloth_.thickest + enough) - cloth_.thickest;
-  auto& [search, now, near] = scratch_.front();
-  if (left < enough) left = std::max(left, list.reach - change(x, state.blocks, list, now));
-  if (state.has_some && left >= enough) nearer(list.all, x, 0, near, left);
-  return left;
-}
-
 // Has states for all blocks that may be near. closer: of those that were apart, ascending.
-template <class Came>
-void PairLists::meet(const Came& came, double spare, const std::vector<std::size_t>& closer) {
+void PairLists::meet(double spare, const std::vector<std::size_t>& closer) {
   constexpr double kApart = 1.5;  // of the thickest cloth, beside what it comes
   constexpr int kMostLooks = 64;  // until others may lie flat together
   const bool all =
       before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_ || ++looks_ == kMostLooks;
   if (all) looks_ = 0;
   std::vector<BlockPair> met;
+  bent_.resize(4 * static_cast<std::size_t>(blocks_.blocks()), -1);
+  const auto bent = [&](const NearBlocks::Node& node) -> std::int64_t& {
+    return bent_[static_cast<std::size_t>(node.number)];
+  };
+  const auto is_bent = [&](const NearBlocks::Node& node) { return bent(node) == updates_; };
   const auto is_far = [&](const NearBlocks::Node& one, const NearBlocks::Node& other, double gap) {
     const double comes = came(one.number, other.number);
     double left = gap - cloth_.thickest;
     if (left < comes + kApart * cloth_.thickest) {
       if (one.count() + other.count() == 2) return false;
+      // nor does what lies around them lie flat
+      if (is_bent(one) || is_bent(other)) return false;
       left = blocks_.distance_if_flat(one, other) - cloth_.thickest;
-      if (left < least_left(comes) + spare) return false;
+      if (left < least_left(comes) + spare) {
+        if (one.number == other.number) bent(one) = updates_;
+        return false;
+      }
     }
     apart_.push_back({one, other, left});
     return true;
@@ -204,9 +174,9 @@ double PairLists::least_left(double come) const {
   return come + std::min(2 * come, 0.5 * cloth_.thickest) + 0.1 * cloth_.thickest;
 }
 
-double PairLists::length(double came) const {
-  const double most = kMostMotion * cloth_.thickest;
-  return came < most ? came : most;
+double PairLists::came(int one, int other) const {
+  const double most = kMostMotion * cloth_.thickest, by = in_window_.between(one, other);
+  return by < most ? by : most;
 }
 
 // Positions of the particles of both blocks, or of the one.
@@ -225,11 +195,11 @@ void PairLists::place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at
 double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List& list,
                          Matrix3Xd& now) {
   place(x, blocks, now);
-  const Eigen::Index last = now.cols() - 1, half = last / 2;
   // any that turns with the cloth
   const auto frame = [&](const Matrix3Xd& at) -> Eigen::Matrix3d {
     constexpr double kOnALine = 1e-3;  // sine
-    const Vector3d a = at.col(last) - at.col(0), b = at.col(half) - at.col(0), out = a.cross(b);
+    const auto [i, j, k] = list.corners;
+    const Vector3d a = at.col(j) - at.col(i), b = at.col(k) - at.col(i), out = a.cross(b);
     if (!(out.norm() > kOnALine * a.norm() * b.norm())) return Eigen::Matrix3d::Identity();
     Eigen::Matrix3d axes;
     axes.col(0) = a.normalized();
@@ -240,7 +210,7 @@ double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List
   const Eigen::Matrix3d turn = frame(now) * frame(list.made_at).transpose();
   Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()),
                  high = -low;
-  for (Eigen::Index k = 0; k <= last; ++k) {
+  for (Eigen::Index k = 0; k < now.cols(); ++k) {
     const Eigen::Array3d by = (now.col(k) - turn * list.made_at.col(k)).array();
     low = low.min(by);
     high = high.max(by);
@@ -302,6 +272,7 @@ void PairLists::renew(const Matrix3Xd& x, double least, double reach, Scratch& s
       cloth_, find_pairs(cloth_, blocks_, state.blocks, x, reach, list.reach, scratch.search));
   state.left = list.reach;
   place(x, state.blocks, list.made_at);
+  list.corners = far_corners(list.made_at);
   state.has_some = !list.all.empty();
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -25,14 +27,8 @@ class PairLists {
   // the lists hold every pair that was nearer than its thickness and what its blocks have come
   // since, or kMostMotion.
   void update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& pool);
-  // The same for a window that begins at `from`, in which nothing will come farther in relation to
-  // anything else than `come`, m.
-  void expect(const Matrix3Xd& from, double come, ThreadPool& pool);
-  // While they are empty: cloth that was at the last `from` is now about here. Looks only whether
-  // it may come as far as `come` from here on, m.
-  void look(const Places& now, double come, ThreadPool& pool);
-  // How far particles may come in relation to each other, from the last `from` or place looked at
-  // on, until lists do not hold any more, m.
+  // How far particles may come in relation to each other, from the last `from` on, until lists do
+  // not hold any more, m.
   double lasts() const { return lasts_; }
   // Of the thickest cloth; pairs that came farther in a window, or since the last update, may be
   // missed.
@@ -57,8 +53,9 @@ class PairLists {
     int bent = 0, bent_for = 0;  // how often it is not asked whether they lie flat
   };
   struct List {
-    double reach = 0;        // when it was made, m
-    Matrix3Xd made_at = {};  // of the particles of both blocks, m; or empty
+    double reach = 0;                          // when it was made, m
+    Matrix3Xd made_at = {};                    // of the particles of both blocks, m; or empty
+    std::array<Eigen::Index, 3> corners = {};  // of these, far from each other
     Candidates all = {}, near = {};
   };
   // Nodes of blocks that are so far apart, or lie so flat together, that no two of their blocks
@@ -71,20 +68,14 @@ class PairLists {
   struct Scratch {
     NearBlocks::Search search;
     Matrix3Xd now;
-    Candidates near;
   };
 
-  template <class Came>
-  void look(const Matrix3Xd& x, const Came& came, double spare, ThreadPool& pool);
-  template <class Came>
-  void meet(const Came& came, double spare, const std::vector<std::size_t>& closer);
+  double came(int one, int other) const;  // no more than kMostMotion
+  void meet(double spare, const std::vector<std::size_t>& closer);
   void add(const std::vector<BlockPair>& met, bool only);
   double least_left(double come) const;
-  double length(double came) const;  // no more than kMostMotion
   int number(int block) const { return blocks_.number(block); }
   void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
-  double left_at(const Matrix3Xd& x, const State& state, const List& list, double left,
-                 double enough);
   double change(const Matrix3Xd& x, const BlockPair& blocks, const List& list, Matrix3Xd& now);
   void look_closer(const Matrix3Xd& x, double spare, Scratch& scratch, State& state, List& list);
   void renew(const Matrix3Xd& x, double least, double reach, Scratch& scratch, State& state,
@@ -93,17 +84,17 @@ class PairLists {
 
   const Cloth& cloth_;
   NearBlocks blocks_;
-  Matrix3Xd before_;     // where the window of the last update began, m; or empty
-  Places before_about_;  // the same
-  double lasts_ = -1;    // m
+  Matrix3Xd before_;   // where the window of the last update began, m; or empty
+  double lasts_ = -1;  // m
   std::vector<Apart> apart_, reopened_;
+  std::vector<std::int64_t> bent_;  // of each node: the last update in which it was
+  std::int64_t updates_ = 0;
   std::size_t met_ = 0;                       // of them and of states, when all were looked for
   int looks_ = 0;                             // since then
   std::vector<State> states_;                 // in ascending order of blocks
   std::vector<std::unique_ptr<List>> lists_;  // of these
   std::size_t near_ = 0;                      // lists that have some
   BlockMotion since_, in_window_;
-  Matrix3Xd now_all_;
   std::vector<Scratch> scratch_ = std::vector<Scratch>(1);
 };
 

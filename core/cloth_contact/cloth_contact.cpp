@@ -139,6 +139,11 @@ void ClothContact::find_near(ThreadPool& pool) {
 
 void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPool& pool) {
   find_near(pool);
+  inverse_mass_.clear();
+  if (!near_.empty())
+    for (const MovingSheet& sheet : sheets)
+      inverse_mass_.insert(inverse_mass_.end(), sheet.dynamics.inverse_mass.begin(),
+                           sheet.dynamics.inverse_mass.end());
   const Separation::Ways ways{begin_, x_, d_, inverse_mass_};
   const int others = std::max(1, static_cast<int>(scene_.sheets.size()) - 1);
   separation_.touch(near_, untangling_, ways, PairLists::kMostMotion * cloth_.thickest, others,
@@ -201,7 +206,6 @@ std::int64_t ClothContact::count_cuts(std::span<const MovingSheet> sheets, Threa
 void ClothContact::read(std::span<MovingSheet> sheets, ThreadPool& pool) {
   x_.resize(3, cloth_.particles());
   d_.resize(3, cloth_.particles());
-  inverse_mass_.resize(static_cast<std::size_t>(cloth_.particles()));
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     const int first = cloth_.first_particle[s], count = cloth_.first_particle[s + 1] - first;
     for (int i = static_cast<int>(numbers_.size()); i < count; ++i) numbers_.push_back(i);
@@ -211,7 +215,6 @@ void ClothContact::read(std::span<MovingSheet> sheets, ThreadPool& pool) {
       sheets[s].solver->read(own, x_.middleCols(first + begin, end - begin),
                              d_.middleCols(first + begin, end - begin));
     });
-    Eigen::VectorXd::Map(inverse_mass_.data() + first, count) = sheets[s].dynamics.inverse_mass;
   }
 }
 

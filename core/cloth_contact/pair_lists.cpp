@@ -40,6 +40,7 @@ void PairLists::forget() {
   states_ = {};
   lists_ = decltype(lists_)();
   apart_ = reopened_ = {};
+  bent_at_ = {};
   since_.forget();
   in_window_.forget();
   near_ = met_ = 0;
@@ -125,27 +126,26 @@ void PairLists::look_closer(const Matrix3Xd& x, double spare, Scratch& scratch, 
 
 // Has states for all blocks that may be near. closer: of those that were apart, ascending.
 void PairLists::meet(double spare, const std::vector<std::size_t>& closer) {
-  constexpr double kApart = 1.5;  // of the thickest cloth, beside what it comes
-  constexpr int kMostLooks = 64;  // until others may lie flat together
-  const bool all =
-      before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_ || ++looks_ == kMostLooks;
-  if (all) looks_ = 0;
+  constexpr double kApart = 1.5;    // of the thickest cloth, beside what it comes
+  constexpr int kMostUpdates = 64;  // until others may lie flat together
+  const bool all = before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_ ||
+                   updates_ - all_met_at_ >= kMostUpdates;
+  if (all) all_met_at_ = updates_;
   std::vector<BlockPair> met;
-  bent_.resize(4 * static_cast<std::size_t>(blocks_.blocks()), -1);
-  const auto bent = [&](const NearBlocks::Node& node) -> std::int64_t& {
-    return bent_[static_cast<std::size_t>(node.number)];
+  bent_at_.resize(4 * static_cast<std::size_t>(blocks_.blocks()));
+  const auto bent_at = [&](const NearBlocks::Node& node) -> std::int64_t& {
+    return bent_at_[static_cast<std::size_t>(node.number)];
   };
-  const auto is_bent = [&](const NearBlocks::Node& node) { return bent(node) == updates_; };
   const auto is_far = [&](const NearBlocks::Node& one, const NearBlocks::Node& other, double gap) {
     const double comes = came(one.number, other.number);
     double left = gap - cloth_.thickest;
     if (left < comes + kApart * cloth_.thickest) {
       if (one.count() + other.count() == 2) return false;
-      // nor does what lies around them lie flat
-      if (is_bent(one) || is_bent(other)) return false;
+      // what is bent hardly lies flat with others
+      if (bent_at(one) == updates_ || bent_at(other) == updates_) return false;
       left = blocks_.distance_if_flat(one, other) - cloth_.thickest;
       if (left < least_left(comes) + spare) {
-        if (one.number == other.number) bent(one) = updates_;
+        if (one.number == other.number) bent_at(one) = updates_;
         return false;
       }
     }

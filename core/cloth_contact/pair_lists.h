@@ -86,11 +86,11 @@ class PairLists {
   NearBlocks blocks_;
   Matrix3Xd before_;   // where the window of the last update began, m; or empty
   double lasts_ = -1;  // m
-  std::vector<Apart> apart_, reopened_;
-  std::vector<std::int64_t> bent_;  // of each node: the last update in which it was
   std::int64_t updates_ = 0;
-  std::size_t met_ = 0;                       // of them and of states, when all were looked for
-  int looks_ = 0;                             // since then
+  std::vector<Apart> apart_, reopened_;
+  std::int64_t all_met_at_ = 0;               // the update in which all were looked for
+  std::size_t met_ = 0;                       // of them and of states then
+  std::vector<std::int64_t> bent_at_;         // of each node: the last update in which it was bent
   std::vector<State> states_;                 // in ascending order of blocks
   std::vector<std::unique_ptr<List>> lists_;  // of these
   std::size_t near_ = 0;                      // lists that have some

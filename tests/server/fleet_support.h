@@ -110,10 +110,16 @@ class Fleet : public ::testing::Test {
     request.set_name(session.name());
     return service.error(&Service::Sessions::GetSession, request);
   }
+  static void ask_later() { std::this_thread::sleep_for(std::chrono::milliseconds(5)); }
+  // Asks until no other server holds the session: the database learns a moment late who died.
+  static Error get_error_when_left(Service& service, const v1::Session& session) {
+    Error error = get_error(service, session);
+    for (; error.reason() == "WRONG_REPLICA"; error = get_error(service, session)) ask_later();
+    return error;
+  }
   // Asks until the server has taken the session over, and is where the other one was.
   static v1::Session insist(Service& service, const v1::Session& session) {
-    const auto ask_later = [] { std::this_thread::sleep_for(std::chrono::milliseconds(5)); };
-    while (get_error(service, session).reason() == "WRONG_REPLICA") ask_later();
+    get_error_when_left(service, session);
     while (service.get(session).state() == v1::SESSION_STATE_RESTORING) ask_later();
     return service.get(session);
   }

@@ -77,6 +77,26 @@ Scene dressed_scene() {
   return scene;
 }
 
+// Two swatches that fall evenly, one above the other, until the lower one meets a plane.
+Scene landing_scene() {
+  Scene scene;
+  for (const double height : {0.0025, 0.005}) {
+    SheetDefinition& sheet = scene.sheets.emplace_back(rough_sheet(Grid{3, 5, 0.01}, Isometric{}));
+    sheet.pins.clear();
+    sheet.start_positions.clear();
+    for (int i = 0; i < sheet.particle_count(); ++i) {
+      const Vector3d at = local_position(sheet.shape, i);
+      sheet.start_positions.insert(sheet.start_positions.end(), {at.x(), at.y() + height, at.z()});
+      sheet.start_velocities.insert(sheet.start_velocities.end(), {0, -2, 0});
+    }
+  }
+  scene.colliders.push_back({"plane", Plane{}, 0.3, {}});
+  scene.cloth_contact = true;
+  scene.solver.frame_step = 1e-3;
+  scene.solver.substep = 2e-5;
+  return scene;
+}
+
 // A swatch that falls onto another as fast as windows of contact are shortened for.
 Scene fallen_scene() {
   Scene scene;
@@ -125,7 +145,7 @@ std::uint64_t fingerprint() {
   fine.solver = default_settings(Accuracy::kFine);
   fine.solver.frame_step = dressed.solver.frame_step;
   for (const Scene& scene :
-       {single, twofold, plain, tethered, draft, dressed, fine, fallen_scene()}) {
+       {single, twofold, plain, tethered, draft, dressed, fine, fallen_scene(), landing_scene()}) {
     Simulation simulation(scene);
     std::vector<double> x(3 * static_cast<std::size_t>(simulation.particle_count()));
     for (int frame = 0; frame < 4; ++frame) {

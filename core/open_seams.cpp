@@ -15,7 +15,7 @@ constexpr double kSpacing = 0.01;  // of points that are looked at along an edge
 constexpr double kOutward = 1;     // fastest that an edge is pushed out, m/s
 
 // Of an edge, between its ends and the points that are looked at along it.
-int parts_of(const Vector3d& from, const Vector3d& to) {
+int parts_between(const Vector3d& from, const Vector3d& to) {
   return static_cast<int>((to - from).norm() / kSpacing);
 }
 
@@ -124,7 +124,7 @@ void OpenSeams::keep_out(const Contacts& contacts, double dt, MovingSheet& sheet
   std::map<int, Move> moves;
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     const auto& ends = edges_[e];
-    const int parts = parts_of(x_.col(ends[0]), x_.col(ends[1]));
+    const int parts = parts_between(x_.col(ends[0]), x_.col(ends[1]));
     clear_[e] -= std::max(come[ends[0]], come[ends[1]]) + contacts.reach();
     if (parts == parts_[e] && clear_[e] > 0) continue;
     const auto [nearest, clear, normal, share] =

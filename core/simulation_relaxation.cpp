@@ -2,6 +2,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/forces/elastic.h"
 #include "core/lattice/coarser.h"
 #include "core/lattice/lattice.h"
 #include "core/lattice/shown.h"

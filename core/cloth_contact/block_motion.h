@@ -24,8 +24,6 @@ class BlockMotion {
     const Eigen::Array4f sides = a.high.max(b.high) - a.low.min(b.low);
     return kOfRounding * double{sides.matrix().norm()} + kRounding;
   }
-  // The same of any two, m.
-  double most() const { return between(1, 1); }
 
  private:
   static constexpr double kOfRounding = 1 + 1e-6, kRounding = 1e-12;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 
 #include "core/cloth_contact/cuts.h"
 
@@ -17,6 +18,19 @@ constexpr double kWindowTime = 2.5e-4;
 // and what is not looked at closer
 constexpr double kWindowReach = 0.5, kReachUnmet = 1.0, kLeastReach = 0.02;
 constexpr double kSpare = 1.25;  // where steps are faster than the ones before
+// By how much steps change in a window that is known ahead, at most, of the thickest cloth; and
+// where they change more than at its begin.
+constexpr double kSteady = 0.05, kSpareChange = 1.5;
+// Of a step in single precision, of places within 10 m, m.
+constexpr double kPlaceRounding = 1e-6;
+
+// Since last asked, in relation to each other, m.
+double change_of(std::span<const MovingSheet> sheets) {
+  double change = 0;
+  for (const MovingSheet& sheet : sheets)
+    change = std::max(change, 2 * kMotionRounding * sheet.solver->take_change());
+  return change;
+}
 
 // Of windows.
 double share_of(const SolverSettings& settings) {
@@ -45,10 +59,11 @@ void ClothContact::forget_motion() {
   all_ = {};
   near_ = {};
   separation_ = {};
-  begin_ = x_ = d_ = {};
+  begin_ = x_ = d_ = ahead_ = {};
   own_x_ = own_d_ = {};
   window_ = {};
   come_ = moved_ = 0;
+  steady_.forget();
 }
 
 void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame,
@@ -60,33 +75,44 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
     in_step = std::max(in_step, 2 * kMotionRounding * sheet.solver->moved());
     pushed = std::max(pushed, 2 * kMotionRounding * sheet.solver->pushed());
   }
+  const double changed = kPlaceRounding + change_of(sheets);
+  steady_.change(changed);
+  steady_.step();
   come_ += pushed;
   // as where a pin jerks: positions before this step are still known
-  if (come_ + in_step > window_.most_come) window_.steps = 0;
-  if (window_.steps == 0) begin_window(sheets, in_step, pool);
+  if (come_ + in_step > window_.most_come || window_.changed + changed > window_.most_change)
+    window_.steps = 0;
+  if (window_.steps == 0) begin_window(sheets, in_step, changed, pool);
   come_ += in_step;
-  ++window_.steps;
+  if (++window_.steps > 1) window_.changed += changed;
   if (!ends_frame && window_.steps < window_.most_steps && come_ + in_step <= window_.reach) return;
 
-  const bool is_known = window_.is_known;
+  has_met_ = has_met_ || come_ > PairLists::kMostMotion * cloth_.thickest;
+  const Window past = window_;
+  const bool is_known = past.is_known && !(lists_.empty() && untangling_.empty() && stays_apart(0));
   // the begin of a window of one step told where it ends, unless pairs are led apart meanwhile
   const bool is_read = window_.steps == 1 && untangling_.empty();
   window_ = {.most_steps = ends_frame ? 1 : most_steps(scene_.solver, dt, halvings_)};
   untangling_.lead(sheets, dt);
   if (is_known) {
     if (!is_read) read(sheets, pool);
-    act(sheets, ends_frame, pool);
+    act(sheets, past, ends_frame, pool);
   }
   if (ends_frame) separation_.forget_given();
 }
 
-void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step, ThreadPool& pool) {
+void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step, double changed,
+                                ThreadPool& pool) {
   moved_ += come_;
   come_ = 0;
   window_.reach = reach(in_step);
   window_.most_come = in_step + kSpare * window_.reach;
-  const bool holds = moved_ + window_.most_come <= lists_.lasts();
-  window_.is_known = scene_.solver.plain || !lists_.empty() || !holds;
+  window_.changed = 0;
+  window_.most_change = most_change(changed);
+  const bool is_unmet = !scene_.solver.plain && lists_.empty();
+  const int more = window_.most_steps - 1;
+  window_.is_known =
+      !is_unmet || !(moved_ + window_.most_come <= lists_.lasts() || stays_apart(more));
   if (!window_.is_known) return;
   read(sheets, pool);
   begin_.resize(3, x_.cols());
@@ -94,6 +120,33 @@ void ClothContact::begin_window(std::span<MovingSheet> sheets, double in_step, T
     begin_.middleCols(from, to - from) =
         x_.middleCols(from, to - from) - d_.middleCols(from, to - from);
   });
+  if (!is_unmet || !std::isfinite(window_.most_change)) return;
+  steady_.measure(x_, d_, pool);
+  if (!stays_apart(more)) look_ahead(pool);
+  window_.is_known = !lists_.empty() || !stays_apart(more);
+}
+
+// After the first step of a window.
+void ClothContact::look_ahead(ThreadPool& pool) {
+  ahead_ = begin_ + window_.most_steps * d_;
+  lists_.update(begin_, ahead_, pool);
+  moved_ = 0;
+  steady_.begin(begin_, ahead_, window_.most_steps, 1);
+}
+
+// Whether nothing is near that lists do not have until so many more steps are taken, if these
+// change no more than foreseen.
+bool ClothContact::stays_apart(int steps) const {
+  return steady_.strays(steps, window_.most_change) <= lists_.lasts_beside(steady_.times(steps));
+}
+
+// By how much steps may change in a window whose first one has changed by so much, m; where much
+// changes, or anything meets, it is not foreseen.
+double ClothContact::most_change(double changed) const {
+  const double change = kSpareChange * window_.most_steps * changed;
+  const bool is_steady = !has_met_ && untangling_.empty() &&
+                         change < kSteady * share_of(scene_.solver) * cloth_.thickest;
+  return is_steady ? change : std::numeric_limits<double>::infinity();
 }
 
 // Of the motion in a window whose steps are like one, m.
@@ -105,9 +158,8 @@ double ClothContact::reach(double in_step) const {
 }
 
 // What may have met in the window.
-void ClothContact::find_near(ThreadPool& pool) {
+void ClothContact::find_near(const Window& past, ThreadPool& pool) {
   const double most = PairLists::kMostMotion * cloth_.thickest;
-  has_met_ = has_met_ || come_ > most;
   near_.clear();
   const auto add = [&](const BlockPair& blocks, const Candidates& candidates, double come) {
     const auto friction = [&](int block) {
@@ -130,6 +182,10 @@ void ClothContact::find_near(ThreadPool& pool) {
   if (!last) {
     lists_.update(begin_, x_, pool);
     moved_ = 0;
+    if (lists_.empty()) {
+      steady_.begin(begin_, x_, past.steps, past.steps);
+      steady_.change(past.changed);
+    }
   }
   const double come = std::min(come_, most);
   lists_.for_each_list([&](const BlockPair& blocks, const Candidates& candidates, double came) {
@@ -137,8 +193,9 @@ void ClothContact::find_near(ThreadPool& pool) {
   });
 }
 
-void ClothContact::act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPool& pool) {
-  find_near(pool);
+void ClothContact::act(std::span<MovingSheet> sheets, const Window& past, bool ends_frame,
+                       ThreadPool& pool) {
+  find_near(past, pool);
   inverse_mass_.clear();
   if (!near_.empty())
     for (const MovingSheet& sheet : sheets)
@@ -179,6 +236,8 @@ const std::vector<ClothPair>& ClothContact::cuts_of_last(std::span<const MovingS
 void ClothContact::begin_frame(std::span<const MovingSheet> sheets, int halvings, double speed,
                                ThreadPool& pool) {
   halvings_ = halvings;
+  // what came after the last step: windows are those of a frame that is gone on from
+  steady_.change(change_of(sheets));
   const bool was_empty = untangling_.empty();
   untangling_.clear();
   has_met_ = false;

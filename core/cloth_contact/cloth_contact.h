@@ -7,6 +7,7 @@
 
 #include "core/cloth_contact/pair_lists.h"
 #include "core/cloth_contact/separation.h"
+#include "core/cloth_contact/steady_motion.h"
 #include "core/cloth_contact/untangling.h"
 #include "core/moving_sheet.h"
 
@@ -17,9 +18,11 @@ namespace weft {
 //
 // Contact acts once in a window of several steps, in which nothing moves far in relation to what it
 // is near; a window ends with its frame at the latest, so frames can be gone on from. Where it ends
-// it is known how far everything came, and so what may have met, but where nothing was near enough
-// to begin with. A step in which something comes farther than was foreseen for its window begins a
-// window of its own. What comes of it does not depend on lists, nor on who computes them.
+// it is known how far everything came, and so what may have met. Where nothing was near enough to
+// begin with, and steps hardly change from one to the next (steady_motion.h), nothing is read for
+// many windows. A step in which something comes farther, or that changes by more, than was foreseen
+// for its window begins a window of its own. What comes of it does not depend on lists, nor on who
+// computes them.
 class ClothContact {
  public:
   // Holds on to the scene.
@@ -58,15 +61,21 @@ class ClothContact {
   // Steps after which contact acts once.
   struct Window {
     int steps = 0, most_steps = 1;
-    double reach = 0;       // of motion in it, in relation to anything else, m
-    double most_come = 0;   // what is foreseen; where more comes it begins anew, m
+    double reach = 0;  // of motion in it, in relation to anything else, m
+    // What is foreseen; where more comes, or steps change by more, it begins anew, m.
+    double most_come = 0, most_change = 0;
+    double changed = 0;     // steps in it have, at most, m
     bool is_known = false;  // where it began
   };
 
   double reach(double in_step) const;
-  void begin_window(std::span<MovingSheet> sheets, double in_step, ThreadPool& pool);
-  void act(std::span<MovingSheet> sheets, bool ends_frame, ThreadPool& pool);
-  void find_near(ThreadPool& pool);
+  double most_change(double changed) const;
+  bool stays_apart(int steps) const;
+  void begin_window(std::span<MovingSheet> sheets, double in_step, double changed,
+                    ThreadPool& pool);
+  void look_ahead(ThreadPool& pool);
+  void act(std::span<MovingSheet> sheets, const Window& past, bool ends_frame, ThreadPool& pool);
+  void find_near(const Window& past, ThreadPool& pool);
   void read(std::span<MovingSheet> sheets, ThreadPool& pool);
   void write(std::span<MovingSheet> sheets);
   Matrix3Xd good_positions(std::span<const MovingSheet> sheets) const;
@@ -82,12 +91,14 @@ class ClothContact {
   // in relation to each other: since where the window began, and from where lists were looked at
   // until there, m
   double come_ = 0, moved_ = 0;
+  SteadyMotion steady_;   // since lists were looked at
   double corrected_ = 0;  // how far contact moved a particle in the last step at most, m
   int halvings_ = 0;      // of windows in this frame
   bool has_met_ = false;  // whether anything may have in it
 
   std::vector<double> inverse_mass_;  // of all particles, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m
+  Matrix3Xd ahead_;                   // where the window may end, m
   Matrix3Xd own_x_, own_d_;           // of a sheet, m
   Separation separation_;
   Untangling untangling_;

@@ -45,17 +45,13 @@ void PairLists::forget() {
   in_window_.forget();
   near_ = met_ = 0;
   lasts_ = -1;
+  room_.setConstant(-1);
 }
 
 void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& pool) {
   constexpr std::int64_t kLeastShare = 1024, kLeastCloser = 8;  // of a thread
-  constexpr double kSlow = 0.3, kSpare = 1.5;                   // of the thickest cloth
   ++updates_;
   in_window_.set(from, now, pool);
-  // Where all is slow and nothing near, what holds for less than that beyond the window is made
-  // anew, too: then all holds for some windows.
-  const double spare =
-      near_ == 0 && in_window_.most() < kSlow * cloth_.thickest ? kSpare * cloth_.thickest : 0;
   blocks_.set(from, pool);
   std::vector<std::size_t> closer;  // of apart_
   if (before_.cols() > 0) {
@@ -72,18 +68,15 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& 
       for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
         auto& [one, other, left] = apart_[k];
         left -= since_.between(one.number, other.number);
-        if (!(left >= came(one.number, other.number) + spare)) found.push_back(k);
+        const double comes = came(one.number, other.number);
+        if (!(left >= comes + spare(comes))) found.push_back(k);
       }
     };
     closer = find_in_shares<std::size_t>(pool, std::ssize(apart_), kLeastShare, find_closer);
   }
-  meet(spare, closer);
+  meet(closer);
   before_ = from;
 
-  const auto is_due = [&](const State& state) {
-    return !(state.left >= state.came + spare) ||
-           (state.has_some && !(state.near_left >= state.came + spare / 2));
-  };
   const auto find_due = [&](std::int64_t begin, std::int64_t end, std::vector<std::size_t>& found) {
     for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
       State& state = states_[k];
@@ -97,7 +90,7 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& 
   run_shares(pool, shares, std::ssize(due),
              [&](std::size_t share, std::int64_t begin, std::int64_t end) {
                for (const std::size_t k : part_of(due, begin, end))
-                 look_closer(from, spare, scratch_[share], states_[k], *lists_[k]);
+                 look_closer(from, scratch_[share], states_[k], *lists_[k]);
              });
 
   lasts_ = kMostMotion * cloth_.thickest;
@@ -107,25 +100,59 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& 
     if (state.is_near) ++near_;
   }
   for (const Apart& apart : apart_) lasts_ = std::min(lasts_, apart.left);
+  find_room();
+}
+
+void PairLists::find_room() {
+  room_.setConstant(near_ > 0 ? -1 : lasts_);
+  if (near_ > 0) return;
+  const Room times{1, 2, 4, 8, 16};
+  const auto include = [&](double left, double comes) {
+    const bool may_miss = comes >= kMostMotion * cloth_.thickest;
+    room_ = may_miss ? Room::Constant(-1) : Room(room_.min(left - times * comes));
+  };
+  for (const State& state : states_)
+    include(state.has_some ? state.near_left : state.left, state.came);
+  for (const Apart& apart : apart_) include(apart.left, came(apart.one.number, apart.other.number));
+}
+
+// Concave in `times`.
+double PairLists::lasts_beside(double times) const {
+  times = std::max(times, 1.0);
+  Eigen::Index k = 0;
+  for (double from = 1; k + 1 < room_.size(); ++k, from *= 2)
+    if (times <= 2 * from) return room_[k] + (times / from - 1) * (room_[k + 1] - room_[k]);
+  return -1;
+}
+
+// Where nothing is near, what holds for less than that beyond the window, in which it comes so far,
+// is made anew, too, m: then all holds for some windows.
+double PairLists::spare(double come) const {
+  constexpr double kMore = 2, kLeast = 0.25, kMost = 0.8;  // windows; of the thickest cloth
+  return near_ > 0 ? 0 : std::min(kMore * come + kLeast * cloth_.thickest, kMost * cloth_.thickest);
+}
+
+bool PairLists::is_due(const State& state) const {
+  const double more = spare(state.came);
+  return !(state.left >= state.came + more) ||
+         (state.has_some && !(state.near_left >= state.came + more / 2));
 }
 
 // Some windows pass until it is looked at again. Lists of flat cloth stay empty: what shares no
 // particle there is 2.8 thicknesses apart.
-void PairLists::look_closer(const Matrix3Xd& x, double spare, Scratch& scratch, State& state,
-                            List& list) {
-  const double thickest = cloth_.thickest, comes = state.came;
-  if (!(state.left >= comes + spare))
-    renew(x, least_left(comes) + spare,
-          std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + spare, scratch, state,
+void PairLists::look_closer(const Matrix3Xd& x, Scratch& scratch, State& state, List& list) {
+  const double thickest = cloth_.thickest, comes = state.came, more = spare(comes);
+  if (!(state.left >= comes + more))
+    renew(x, least_left(comes) + more,
+          std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + more, scratch, state,
           list);
-  if (state.has_some && !(state.near_left >= comes + spare / 2))
-    prune(x,
-          comes + (spare > 0 ? spare / 2 : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
+  if (state.has_some && !(state.near_left >= comes + more / 2))
+    prune(x, comes + (more > 0 ? more / 2 : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
           state, list);
 }
 
 // Has states for all blocks that may be near. closer: of those that were apart, ascending.
-void PairLists::meet(double spare, const std::vector<std::size_t>& closer) {
+void PairLists::meet(const std::vector<std::size_t>& closer) {
   constexpr double kApart = 1.5;    // of the thickest cloth, beside what it comes
   constexpr int kMostUpdates = 64;  // until others may lie flat together
   const bool all = before_.cols() == 0 || apart_.size() + states_.size() > 2 * met_ ||
@@ -144,7 +171,7 @@ void PairLists::meet(double spare, const std::vector<std::size_t>& closer) {
       // what is bent hardly lies flat with others
       if (bent_at(one) == updates_ || bent_at(other) == updates_) return false;
       left = blocks_.distance_if_flat(one, other) - cloth_.thickest;
-      if (left < least_left(comes) + spare) {
+      if (left < least_left(comes) + spare(comes)) {
         if (one.number == other.number) bent_at(one) = updates_;
         return false;
       }

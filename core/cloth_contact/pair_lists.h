@@ -28,8 +28,10 @@ class PairLists {
   // since, or kMostMotion.
   void update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& pool);
   // How far particles may come in relation to each other, from the last `from` on, until lists do
-  // not hold any more, m.
+  // not hold any more, m; and how far beside the motion of the last update where that has gone on,
+  // so many times in all.
   double lasts() const { return lasts_; }
+  double lasts_beside(double times) const;
   // Of the thickest cloth; pairs that came farther in a window, or since the last update, may be
   // missed.
   static constexpr double kMostMotion = 8;
@@ -71,13 +73,16 @@ class PairLists {
   };
 
   double came(int one, int other) const;  // no more than kMostMotion
-  void meet(double spare, const std::vector<std::size_t>& closer);
+  double spare(double come) const;
+  void meet(const std::vector<std::size_t>& closer);
   void add(const std::vector<BlockPair>& met, bool only);
   double least_left(double come) const;
+  void find_room();
   int number(int block) const { return blocks_.number(block); }
   void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
   double change(const Matrix3Xd& x, const BlockPair& blocks, const List& list, Matrix3Xd& now);
-  void look_closer(const Matrix3Xd& x, double spare, Scratch& scratch, State& state, List& list);
+  bool is_due(const State& state) const;
+  void look_closer(const Matrix3Xd& x, Scratch& scratch, State& state, List& list);
   void renew(const Matrix3Xd& x, double least, double reach, Scratch& scratch, State& state,
              List& list);
   static void prune(const Matrix3Xd& x, double reach, State& state, List& list);
@@ -86,6 +91,8 @@ class PairLists {
   NearBlocks blocks_;
   Matrix3Xd before_;   // where the window of the last update began, m; or empty
   double lasts_ = -1;  // m
+  using Room = Eigen::Array<double, 5, 1>;
+  Room room_ = Room::Constant(-1);  // beside 1, 2, 4, 8 and 16 times the motion, m
   std::int64_t updates_ = 0;
   std::vector<Apart> apart_, reopened_;
   std::int64_t all_met_at_ = 0;               // the update in which all were looked for

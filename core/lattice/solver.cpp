@@ -12,6 +12,7 @@
 #include "core/lattice/tethers.h"
 #include "core/motion/gaps.h"
 #include "core/motion/saved_values.h"
+#include "core/motion/step_motion.h"
 
 namespace weft {
 namespace {
@@ -57,7 +58,7 @@ class LatticeSolver : public SheetSolver {
     tethers_ = {dynamics_.tethers, law_.layout};
     held_moved_ = true;
     gaps_.forget();
-    pushed_ = 0;
+    motion_.start();
   }
 
   void advance(double time, int slow, ThreadPool& pool) override {
@@ -69,18 +70,18 @@ class LatticeSolver : public SheetSolver {
       law_.drift[axis] = static_cast<T>(drift[static_cast<Eigen::Index>(axis)]);
       law_.wind.velocity[axis] = static_cast<T>(air[static_cast<Eigen::Index>(axis)]);
     }
-    moved_ = sweep(law_, state_, bands(pool), pool);
+    motion_.step(sweep(law_, state_, bands(pool), pool));
   }
 
   void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
     const Place at = state_.place(particle / columns_, particle % columns_);
+    motion_.hold(d, displacement(at));
     set_position(at, x);
     for (int axis = 0; axis < 3; ++axis)
       at[State::kW + axis] =
           static_cast<T>(state_.lead() * d[axis]) - (state_.lead() - 2) * at[State::kD + axis];
     set_displacement(at, d);
     held_moved_ = true;
-    if (measures_) moved_ = std::max(moved_, d.norm());
   }
 
   void pull_back(ThreadPool& pool) override {
@@ -91,7 +92,7 @@ class LatticeSolver : public SheetSolver {
     };
     const int rows = law_.layout.rows, shares = bands(pool);
     if (shares == 1) {
-      moved_ += pull(0, rows);
+      motion_.pull_back(pull(0, rows), dynamics_.tethers.size());
       return;
     }
     std::vector<T> back(static_cast<std::size_t>(shares));
@@ -99,36 +100,35 @@ class LatticeSolver : public SheetSolver {
       back[static_cast<std::size_t>(share)] =
           pull(rows * share / shares, rows * (share + 1) / shares);
     });
-    moved_ += *std::max_element(back.begin(), back.end());
+    motion_.pull_back(*std::max_element(back.begin(), back.end()), dynamics_.tethers.size());
   }
 
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
-    const bool may_cross = contacts.may_cross(moved_);
+    const bool may_cross = contacts.may_cross(motion_.moved());
     if (contacts.first_grid() != nullptr) {
       constexpr std::size_t kGroups = LatticeLayout<T>::kLanes / KnownCells::kParticles;
       known_.resize(static_cast<std::size_t>(law_.layout.rows * state_.vectors()) * kGroups);
     }
-    gaps_.look(moved_ + contacts.reach(), bands(pool), pool, [&](int row) {
-      const std::vector<Vector3d> before = measures_ ? positions_in(row) : std::vector<Vector3d>();
+    gaps_.look(motion_.moved() + contacts.reach(), bands(pool), pool, [&](int row) {
+      const std::vector<Moved> before =
+          motion_.measures() ? particles_in(row) : std::vector<Moved>();
       const double gap =
           may_cross ? resolve_in_parts(contacts, row)
                     : resolve_row(contacts, origin_, law_.compensated, row, known_, state_);
-      if (measures_) pushes_[static_cast<std::size_t>(row)] = farthest_from(before, row);
+      if (motion_.measures()) motion_.push(row, before, particles_in(row));
       return gap;
     });
-    pushed_ = 0;
-    if (measures_)
-      for (const int row : gaps_.looked_at())
-        pushed_ = std::max(pushed_, pushes_[static_cast<std::size_t>(row)]);
+    motion_.pushed(gaps_.looked_at());
   }
 
   void measure() override {
-    law_.measured = measures_ = true;
-    pushes_.resize(gaps_.parts());
+    law_.measured = law_.changes = true;
+    motion_.measure(gaps_.parts());
   }
-  double moved() const override { return moved_; }
-  double pushed() const override { return pushed_; }
+  double moved() const override { return motion_.moved(); }
+  double pushed() const override { return motion_.pushed(); }
+  double take_change() override { return motion_.take_change(); }
   void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
             Eigen::Ref<Matrix3Xd> d) const override {
     for (Eigen::Index k = 0; const int i : particles) {
@@ -139,7 +139,7 @@ class LatticeSolver : public SheetSolver {
   }
   void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
                 const Eigen::Ref<const Matrix3Xd>& in_step) override {
-    moved_ += std::sqrt(by.colwise().squaredNorm().maxCoeff());
+    motion_.displace(by, in_step);
     for (Eigen::Index k = 0; const int i : particles) {
       const Place at = state_.place(i / columns_, i % columns_);
       set_position(at, position(at) + by.col(k));
@@ -296,18 +296,13 @@ class LatticeSolver : public SheetSolver {
     return nearest;
   }
 
-  std::vector<Vector3d> positions_in(int row) {
-    std::vector<Vector3d> x;
-    for (int c = 0; c < columns_; ++c) x.push_back(position(state_.place(row, c)));
-    return x;
-  }
-  double farthest_from(const std::vector<Vector3d>& before, int row) {
-    double squared = 0;
-    for (int c = 0; c < columns_; ++c)
-      squared = std::max(
-          squared,
-          (position(state_.place(row, c)) - before[static_cast<std::size_t>(c)]).squaredNorm());
-    return std::sqrt(squared);
+  std::vector<Moved> particles_in(int row) {
+    std::vector<Moved> particles;
+    for (int c = 0; c < columns_; ++c) {
+      const Place at = state_.place(row, c);
+      particles.push_back({position(at), displacement(at)});
+    }
+    return particles;
   }
 
   // Drag over mass is one for all particles: both go by area, 1/s.
@@ -328,12 +323,9 @@ class LatticeSolver : public SheetSolver {
   bool held_moved_ = true;  // since the ends of tethers were read
   bool started_ = false;
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
-  double moved_ = 0;                    // farthest displacement of the last step, m
-  std::vector<KnownCells> known_;       // of groups of lanes, where the first collider has a grid
-  double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
-  bool measures_ = false;               // pushed_
-  std::vector<double> pushes_;          // the same of each row when last looked at, m
-  Gaps gaps_;                           // of rows
+  StepMotion motion_;
+  std::vector<KnownCells> known_;  // of groups of lanes, where the first collider has a grid
+  Gaps gaps_;                      // of rows
 };
 
 }  // namespace

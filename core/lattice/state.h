@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/motion/aligned_array.h"
+#include "core/motion/step_motion.h"
 
 namespace weft {
 
@@ -38,7 +39,7 @@ template <class T>
 struct SweepBand {
   int first = 0, last = 0;
   AlignedArray<T> before, after;
-  T farthest = 0;  // largest displacement, m
+  Largest<T> largest;
 };
 
 // A lattice sheet in motion. Of every vector, its planes one after the other: shared ones, which

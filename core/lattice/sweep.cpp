@@ -48,7 +48,8 @@ class Sweep {
         planes_(law.damping > 0 || law.wind.blows ? State::kShared : State::kW),
         forces_(work + (kHalo + 1) * kForces),
         velocity_sums_(work + forces_size(law.layout)),
-        largest_(hn::Zero(D())) {
+        largest_(hn::Zero(D())),
+        largest_change_(largest_) {
     for (std::size_t k = 0; k < halo_.size(); ++k) {
       const int at = law.layout.halo(static_cast<int>(k));
       const int shift = law.layout.halo_shift(static_cast<int>(k));
@@ -60,7 +61,7 @@ class Sweep {
     return static_cast<std::size_t>(forces_size(layout) + layout.vectors() * kVelocitySums);
   }
 
-  T run() {
+  void run() {
     std::fill_n(forces_ - kHalo * kForces, 3 * (vectors_ + 2 * kHalo) * kForces, T(0));
     std::fill_n(velocity_sums_, vectors_ * kVelocitySums, T(0));
     const int first = std::max(band_.first - 2, -1);
@@ -73,7 +74,9 @@ class Sweep {
       sweep_row(r);
       fold(r + 1);
     }
-    return std::sqrt(hn::GetLane(hn::MaxOfLanes(D(), largest_)));
+    const auto root = [](V square)
+                          HWY_ATTR { return std::sqrt(hn::GetLane(hn::MaxOfLanes(D(), square))); };
+    band_.largest = {root(largest_), root(largest_change_)};
   }
 
  private:
@@ -502,9 +505,13 @@ class Sweep {
   HWY_INLINE void move(const Place& p, const Triple<V>& force) {
     const D d;
     const V step2 = hn::Load(d, p.local + (State::kStep2 - State::kShared) * kLanes);
+    const Triple<V> old = load(p.local + (State::kD - State::kShared) * kLanes);
     const Triple<V> next{move_axis<0>(p, force.x, step2), move_axis<1>(p, force.y, step2),
                          move_axis<2>(p, force.z, step2)};
     if (law_.measured) largest_ = hn::Max(largest_, hn::And(squared(next), column(p, kHere)));
+    if (law_.changes)
+      largest_change_ =
+          hn::Max(largest_change_, hn::And(squared(minus(next, old)), column(p, kHere)));
   }
 
   template <int kAxis>
@@ -549,22 +556,22 @@ class Sweep {
   const int planes_;  // of the shared ones, those that are used
   T *const forces_, *const velocity_sums_;
   std::array<Halo, 2 * kHalo> halo_;
-  V largest_;  // |d|^2, m^2
+  V largest_, largest_change_;  // squared, m^2
 };
 
 template <BendKind kBend, bool kShears, bool kBendsDiagonal, class T>
-T sweep_as(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band) {
+void sweep_as(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band) {
   using Sweeper = Sweep<T, kBend, kShears, kBendsDiagonal>;
   static thread_local AlignedArray<T> work;
   const std::size_t size = Sweeper::work_size(law.layout);
   if (work.size() < size) work = AlignedArray<T>(size);
-  return Sweeper(law, state, band, work.data()).run();
+  Sweeper(law, state, band, work.data()).run();
 }
 
 // Features are left out of the code where that is measured to pay: all of the default law's, and
 // shear elsewhere.
 template <class T>
-T sweep_lattice(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band) {
+void sweep_lattice(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band) {
   const bool shears = law.shear.stiffness > 0;
   const bool idle = law.bend == BendKind::kIsometric && law.slow == 0;
   switch (idle ? BendKind::kNone : law.bend) {
@@ -590,12 +597,11 @@ T sweep_lattice(const SweepLaw<T>& law, SweepState<T>& state, SweepBand<T>& band
                 : sweep_as<BendKind::kIsometric, false, false>(law, state, band);
 }
 
-float sweep_single(const SweepLaw<float>& law, SweepState<float>& state, SweepBand<float>& band) {
-  return sweep_lattice(law, state, band);
+void sweep_single(const SweepLaw<float>& law, SweepState<float>& state, SweepBand<float>& band) {
+  sweep_lattice(law, state, band);
 }
-double sweep_double(const SweepLaw<double>& law, SweepState<double>& state,
-                    SweepBand<double>& band) {
-  return sweep_lattice(law, state, band);
+void sweep_double(const SweepLaw<double>& law, SweepState<double>& state, SweepBand<double>& band) {
+  sweep_lattice(law, state, band);
 }
 
 }  // namespace weft::HWY_NAMESPACE
@@ -609,30 +615,32 @@ HWY_EXPORT(sweep_double);
 
 namespace {
 
-float sweep_band(const SweepLaw<float>& law, SweepState<float>& state, SweepBand<float>& band) {
-  return HWY_DYNAMIC_DISPATCH(sweep_single)(law, state, band);
+void sweep_band(const SweepLaw<float>& law, SweepState<float>& state, SweepBand<float>& band) {
+  HWY_DYNAMIC_DISPATCH(sweep_single)(law, state, band);
 }
-double sweep_band(const SweepLaw<double>& law, SweepState<double>& state, SweepBand<double>& band) {
-  return HWY_DYNAMIC_DISPATCH(sweep_double)(law, state, band);
+void sweep_band(const SweepLaw<double>& law, SweepState<double>& state, SweepBand<double>& band) {
+  HWY_DYNAMIC_DISPATCH(sweep_double)(law, state, band);
 }
 
 }  // namespace
 
 template <class T>
-T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, ThreadPool& pool) {
+Largest<T> sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, ThreadPool& pool) {
   std::vector<SweepBand<T>>& divided = state.divide(bands);
-  if (bands == 1) return sweep_band(law, state, divided.front());
-  pool.run(bands, [&](int i) {
-    SweepBand<T>& band = divided[static_cast<std::size_t>(i)];
-    band.farthest = sweep_band(law, state, band);
-  });
-  T farthest = 0;
-  for (const SweepBand<T>& band : divided) farthest = std::max(farthest, band.farthest);
-  return farthest;
+  const auto share = [&](int i) { sweep_band(law, state, divided[static_cast<std::size_t>(i)]); };
+  if (bands == 1)
+    share(0);
+  else
+    pool.run(bands, share);
+  Largest<T> largest;
+  for (const SweepBand<T>& band : divided)
+    largest = {std::max(largest.moved, band.largest.moved),
+               std::max(largest.changed, band.largest.changed)};
+  return largest;
 }
 
-template float sweep(const SweepLaw<float>&, SweepState<float>&, int, ThreadPool&);
-template double sweep(const SweepLaw<double>&, SweepState<double>&, int, ThreadPool&);
+template Largest<float> sweep(const SweepLaw<float>&, SweepState<float>&, int, ThreadPool&);
+template Largest<double> sweep(const SweepLaw<double>&, SweepState<double>&, int, ThreadPool&);
 
 }  // namespace weft
 #endif

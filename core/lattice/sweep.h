@@ -80,6 +80,7 @@ struct SweepLaw {
   std::array<T, 3> drift{};  // (gravity + c / m air) dt^2, m
   bool compensated = true;   // the sums of d and x
   bool measured = false;     // whether sweep() says how far particles went
+  bool changes = false;      // and by how much that has changed
 
   AlignedArray<T> columns;   // (vectors x kColumnPlanes x lanes)
   std::vector<char> border;  // of each vector: whether some column lacks a neighbour
@@ -93,8 +94,8 @@ struct SweepLaw {
 
 // One substep of eq. 2 to 8 over the whole lattice, in one sweep over its rows: every connection
 // once, forces and motion while they are in cache. Equal bits on every processor with FMA, and for
-// every number of bands. Returns the largest displacement where law.measured, m.
+// every number of bands.
 template <class T>
-T sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, ThreadPool& pool);
+Largest<T> sweep(const SweepLaw<T>& law, SweepState<T>& state, int bands, ThreadPool& pool);
 
 }  // namespace weft

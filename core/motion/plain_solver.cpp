@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/motion/saved_values.h"
 #include "core/motion/sheet_solver.h"
@@ -54,6 +55,7 @@ class PlainSolver : public SheetSolver {
     return std::sqrt(motion_.d.colwise().squaredNorm().maxCoeff()) + pulled_;
   }
   double pushed() const override { return pushed_; }
+  double take_change() override { return std::numeric_limits<double>::infinity(); }
   void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
             Eigen::Ref<Matrix3Xd> d) const override {
     for (Eigen::Index k = 0; const int i : particles) {

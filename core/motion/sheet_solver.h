@@ -29,12 +29,15 @@ class SheetSolver {
   // Moves free particles out of colliders.
   virtual void resolve(const Contacts& contacts, ThreadPool& pool) = 0;
 
-  // From the next step on says how far particles come.
+  // From the next step on says how far particles come, and by how much that changes.
   virtual void measure() = 0;
   // The largest displacement of the last step, and the farthest that resolve() has moved a particle
   // since, at most, m.
   virtual double moved() const = 0;
   virtual double pushed() const = 0;
+  // By how much a particle's displacement in a step, and what moved it beside that, differ from its
+  // displacement when this was last asked, at most, m; infinite where that is not known.
+  virtual double take_change() = 0;
   // Of some particles: positions and displacements of the last step, m. (3 x particles)
   virtual void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
                     Eigen::Ref<Matrix3Xd> d) const = 0;

@@ -94,6 +94,7 @@ struct TriangleLaw {
   T slow = 1;  // how many times as strongly drag acts in this substep; 0: neither it nor wind does
   bool compensated = true;  // the sums of d and x
   bool measured = false;    // whether sweep() says how far particles went
+  bool changes = false;     // and by how much that has changed
 };
 
 // Everything but damping, drag, drift and air, which depend on the step. Nothing where particles

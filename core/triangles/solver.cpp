@@ -10,6 +10,7 @@
 #include "core/forces/hinges.h"
 #include "core/motion/gaps.h"
 #include "core/motion/saved_values.h"
+#include "core/motion/step_motion.h"
 #include "core/triangles/contact.h"
 #include "core/triangles/law.h"
 #include "core/triangles/sweep.h"
@@ -32,7 +33,7 @@ class TriangleSolver : public SheetSolver {
         gaps_(static_cast<std::size_t>(law_.blocks()) * kRunsOfBlock, kRunsOfBlock) {
     law_.compensated = compensated;
     law_.drags = dynamics.drag.size() > 0;
-    law_.measured = false;
+    law_.measured = law_.changes = false;
     law_.wind = wind;
     state_.prepare(law_);
     if (!mesh.surface.hinges.empty()) find_hinged();
@@ -57,7 +58,7 @@ class TriangleSolver : public SheetSolver {
       put(state_.w, i, state_.lead == 2 ? Vector3d(2 * d) : Vector3d(v.col(i) * (2 * dt)));
     }
     gaps_.forget();
-    pushed_ = 0;
+    motion_.start();
   }
 
   void advance(double time, int slow, ThreadPool& pool) override {
@@ -72,55 +73,55 @@ class TriangleSolver : public SheetSolver {
       law_.wind.velocity[axis] = static_cast<T>(speed);
     }
     if (!hinges_.empty()) turn_hinges();
-    moved_ = sweep(law_, state_, bands(pool), pool);
+    motion_.step(sweep(law_, state_, bands(pool), pool));
   }
 
   void move_held(int particle, const Vector3d& x, const Vector3d& d) override {
     set(state_.x, state_.x_error, particle, x - origin_);
     const std::size_t at = place(particle);
+    motion_.hold(d, exact(state_.d, state_.d_error, at));
     for (std::size_t axis = 0; axis < 3; ++axis)
       state_.w.data()[at + axis] =
           static_cast<T>(state_.lead * d[static_cast<Eigen::Index>(axis)]) -
           (state_.lead - 2) * state_.d.data()[at + axis];
     set(state_.d, state_.d_error, particle, d);
-    if (measures_) moved_ = std::max(moved_, d.norm());
   }
 
   void pull_back(ThreadPool& /*pool*/) override {
     const auto get = [&](int i) {
       return Moved{position_at(place(i)), exact(state_.d, state_.d_error, place(i))};
     };
-    moved_ += weft::pull_back(dynamics_.tethers, kInward * dt_, get, [&](int i, const Moved& to) {
+    const auto put = [&](int i, const Moved& to) {
       add(i, to.x - position_at(place(i)), to.d - exact(state_.d, state_.d_error, place(i)));
-    });
+    };
+    motion_.pull_back(weft::pull_back(dynamics_.tethers, kInward * dt_, get, put),
+                      dynamics_.tethers.size());
   }
 
   void resolve(const Contacts& contacts, ThreadPool& pool) override {
     law_.measured = true;
-    const bool may_cross = contacts.may_cross(moved_);
+    const bool may_cross = contacts.may_cross(motion_.moved());
     if (contacts.first_grid() != nullptr) known_.resize(gaps_.parts());
-    gaps_.look(moved_ + contacts.reach(), bands(pool), pool, [&](int run) {
-      const Positions before = measures_ ? positions_in(run) : Positions();
+    gaps_.look(motion_.moved() + contacts.reach(), bands(pool), pool, [&](int run) {
+      const Run before = motion_.measures() ? particles_in(run) : Run();
       const double gap =
           may_cross ? resolve_in_parts(contacts, run)
                     : resolve_run(contacts, origin_, law_.compensated, run, known_, state_);
-      if (measures_)
-        pushes_[static_cast<std::size_t>(run)] =
-            gap < 0 || may_cross ? farthest_from(before, run) : 0;
+      if (motion_.measures())
+        gap < 0 || may_cross ? motion_.push(run, before, particles_in(run))
+                             : motion_.push_none(run);
       return gap;
     });
-    pushed_ = 0;
-    if (measures_)
-      for (const int run : gaps_.looked_at())
-        pushed_ = std::max(pushed_, pushes_[static_cast<std::size_t>(run)]);
+    motion_.pushed(gaps_.looked_at());
   }
 
   void measure() override {
-    law_.measured = measures_ = true;
-    pushes_.resize(gaps_.parts());
+    law_.measured = law_.changes = true;
+    motion_.measure(gaps_.parts());
   }
-  double moved() const override { return moved_; }
-  double pushed() const override { return pushed_; }
+  double moved() const override { return motion_.moved(); }
+  double pushed() const override { return motion_.pushed(); }
+  double take_change() override { return motion_.take_change(); }
   void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
             Eigen::Ref<Matrix3Xd> d) const override {
     for (Eigen::Index k = 0; const int i : particles) {
@@ -130,7 +131,7 @@ class TriangleSolver : public SheetSolver {
   }
   void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
                 const Eigen::Ref<const Matrix3Xd>& in_step) override {
-    moved_ += std::sqrt(by.colwise().squaredNorm().maxCoeff());
+    motion_.displace(by, in_step);
     for (Eigen::Index k = 0; const int i : particles) {
       add(i, by.col(k), in_step.col(k));
       ++k;
@@ -320,19 +321,13 @@ class TriangleSolver : public SheetSolver {
     return nearest;
   }
 
-  using Positions = std::array<Vector3d, kContactRun>;
-  Positions positions_in(int run) const {
-    Positions x;
+  using Run = std::array<Moved, kContactRun>;
+  Run particles_in(int run) const {
+    Run particles;
     const std::size_t begin = 4 * kContactRun * static_cast<std::size_t>(run);
-    for (std::size_t k = 0; k < kContactRun; ++k) x[k] = position_at(begin + 4 * k);
-    return x;
-  }
-  double farthest_from(const Positions& before, int run) const {
-    const Positions now = positions_in(run);
-    double squared = 0;
     for (std::size_t k = 0; k < kContactRun; ++k)
-      squared = std::max(squared, (now[k] - before[k]).squaredNorm());
-    return std::sqrt(squared);
+      particles[k] = {position_at(begin + 4 * k), exact(state_.d, state_.d_error, begin + 4 * k)};
+    return particles;
   }
 
   const Mesh& mesh_;
@@ -345,15 +340,12 @@ class TriangleSolver : public SheetSolver {
   TriangleState<T> state_;
   bool started_ = false;
   Vector3d origin_ = Vector3d::Zero();  // that x is relative to, m
-  double moved_ = 0;                    // farthest displacement of the last step, at most, m
-  Gaps gaps_;                           // of runs
-  std::vector<Hinge> hinges_;           // by numbers in hinged_
-  std::vector<int> hinged_;             // particles
-  Matrix3Xd hinged_x_, hinged_force_;   // of these, m and N
-  std::vector<KnownCells> known_;       // of runs, where the first collider has a grid
-  double pushed_ = 0;                   // farthest that a particle was moved out of colliders, m
-  bool measures_ = false;               // pushed_
-  std::vector<double> pushes_;          // the same of each run when last looked at, m
+  StepMotion motion_;
+  Gaps gaps_;                          // of runs
+  std::vector<Hinge> hinges_;          // by numbers in hinged_
+  std::vector<int> hinged_;            // particles
+  Matrix3Xd hinged_x_, hinged_force_;  // of these, m and N
+  std::vector<KnownCells> known_;      // of runs, where the first collider has a grid
 };
 
 template <class T>

@@ -231,7 +231,7 @@ HWY_INLINE void gather_block(const TriangleLaw<T>& law,
 template <class T, class D, class V = hn::Vec<D>>
 HWY_INLINE void move_block(D d, const TriangleLaw<T>& law, TriangleState<T>& state,
                            std::size_t block, const T* HWY_RESTRICT force, V drift, V air,
-                           V& largest) {
+                           V& largest, V& largest_change) {
   constexpr std::size_t kValues = 4 * TriangleLaw<T>::kBlock;
   const auto sum = [&](V old, V change, T* error) HWY_ATTR {
     const V add = hn::Sub(change, hn::Load(d, error));
@@ -264,6 +264,7 @@ HWY_INLINE void move_block(D d, const TriangleLaw<T>& law, TriangleState<T>& sta
     hn::Store(next, d, state.d.data() + i);
     hn::Store(there, d, state.next_x.data() + i);
     if (law.measured) largest = hn::Max(largest, hn::Abs(next));
+    if (law.changes) largest_change = hn::Max(largest_change, hn::Abs(hn::Sub(next, old)));
   }
 }
 
@@ -291,9 +292,9 @@ void move_patch(const TriangleLaw<T>& law, TriangleState<T>& state,
   const D d;
   constexpr std::size_t kMost = TriangleLaw<T>::kLanes;
   HWY_ALIGN T force[4 * TriangleLaw<T>::kBlock];
-  HWY_ALIGN T drift[kMost], air[kMost], reached[kMost] = {};
+  HWY_ALIGN T drift[kMost], air[kMost], reached[kMost] = {}, changed[kMost] = {};
   for (std::size_t k = 0; k < kMost; ++k) drift[k] = law.drift[k % 4], air[k] = law.air[k % 4];
-  auto largest = hn::Zero(d);
+  auto largest = hn::Zero(d), largest_change = largest;
   Gathering<T> next{law.sides.data() + patch.side, law.reaches.data() + patch.reach,
                     law.blown.data() + patch.blown};
   for (std::size_t k = 0; k < static_cast<std::size_t>(patch.blocks); ++k) {
@@ -304,10 +305,15 @@ void move_patch(const TriangleLaw<T>& law, TriangleState<T>& state,
       for (std::size_t i = 0; i < 4 * TriangleLaw<T>::kBlock; i += hn::Lanes(d))
         hn::Store(hn::Add(hn::Load(d, force + i), hn::Load(d, turn + i)), d, force + i);
     }
-    move_block(d, law, state, block, force, hn::Load(d, drift), hn::Load(d, air), largest);
+    move_block(d, law, state, block, force, hn::Load(d, drift), hn::Load(d, air), largest,
+               largest_change);
   }
   hn::Store(largest, d, reached);
-  for (std::size_t k = 0; k < kMost; ++k) farthest[k % 4] = std::max(farthest[k % 4], reached[k]);
+  hn::Store(largest_change, d, changed);
+  for (std::size_t k = 0; k < kMost; ++k) {
+    farthest.moved[k % 4] = std::max(farthest.moved[k % 4], reached[k]);
+    farthest.changed[k % 4] = std::max(farthest.changed[k % 4], changed[k]);
+  }
 }
 
 // One substep of the patches first ... last - 1.
@@ -415,7 +421,7 @@ void TriangleState<T>::prepare(const TriangleLaw<T>& law, std::size_t bands) {
 }
 
 template <class T>
-T sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool) {
+Largest<T> sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool) {
   const auto count = static_cast<std::size_t>(bands);
   state.prepare(law, count);
   std::vector<Farthest<T>> farthest(count);
@@ -432,19 +438,23 @@ T sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPoo
   std::swap(state.w, state.next_w);
 
   // by axis, so that it does not depend on the bands
-  T square = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    T most = 0;
-    for (const Farthest<T>& band : farthest) most = std::max(most, band[axis]);
-    square += most * most;
-  }
-  return std::sqrt(square);
+  const auto norm = [&](std::array<T, 4> Farthest<T>::*along) {
+    T square = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      T most = 0;
+      for (const Farthest<T>& band : farthest) most = std::max(most, (band.*along)[axis]);
+      square += most * most;
+    }
+    return std::sqrt(square);
+  };
+  return {norm(&Farthest<T>::moved), norm(&Farthest<T>::changed)};
 }
 
 template struct TriangleState<float>;
 template struct TriangleState<double>;
-template float sweep(const TriangleLaw<float>&, TriangleState<float>&, int, ThreadPool&);
-template double sweep(const TriangleLaw<double>&, TriangleState<double>&, int, ThreadPool&);
+template Largest<float> sweep(const TriangleLaw<float>&, TriangleState<float>&, int, ThreadPool&);
+template Largest<double> sweep(const TriangleLaw<double>&, TriangleState<double>&, int,
+                               ThreadPool&);
 
 }  // namespace weft
 #endif

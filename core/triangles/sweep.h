@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/motion/step_motion.h"
 #include "core/triangles/law.h"
 
 namespace weft {
@@ -42,13 +43,14 @@ struct TriangleState {
   std::size_t size() const { return x.size(); }
 };
 
-// Largest displacements along each axis, m.
+// Along each axis: the largest displacement, and the largest change of one, m.
 template <class T>
-using Farthest = std::array<T, 4>;
+struct Farthest {
+  std::array<T, 4> moved = {}, changed = {};
+};
 
-// One substep. Equal bits on every processor with FMA, and for every number of bands. Returns a
-// bound of the largest displacement where law.measured, m.
+// One substep. Equal bits on every processor with FMA, and for every number of bands.
 template <class T>
-T sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool);
+Largest<T> sweep(const TriangleLaw<T>& law, TriangleState<T>& state, int bands, ThreadPool& pool);
 
 }  // namespace weft

@@ -230,6 +230,41 @@ TEST(ClothContact, MissesNoPairWhereAPinBeginsToMoveWithinAWindow) {
   }
 }
 
+// Bit for bit: layers fall evenly, and the lower one meets a body before they meet each other.
+TEST(ClothContact, MissesNoPairOfLayersThatFallEvenlyOntoABody) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE(seed);
+    SheetDefinition above = soft_lattice(9, 9), below = soft_rectangle(0.08, 0.08);
+    above.origin.y() = 2.2e-3 + 1.5e-4 * seed;
+    for (SheetDefinition* sheet : {&above, &below}) {
+      const Vector3d velocity(0, -4, 0);
+      sheet->start_velocities = values(Matrix3Xd(velocity.replicate(1, sheet->particle_count())));
+    }
+    Scene listed = touching({above, below});
+    Collider ball = solid(ball_mesh(0.03, 3));
+    ball.path = {{0, Vector3d(0.04, -0.034 - 1.3e-4 * seed, 0.04)}};
+    listed.colliders = {ball};
+    listed.solver.frame_step = 0.002;
+    listed.solver.substep = 2.5e-5;
+    Scene plain = listed;
+    plain.solver.plain = true;
+    Simulation one(listed, solver_in_vectors), other(plain, solver_in_vectors),
+        restored(listed, solver_in_vectors);
+    listed.cloth_contact = false;
+    Simulation passing(listed);
+    int same = 0;
+    for (int frame = 0; frame < 5; ++frame) {
+      ASSERT_TRUE(restored.restore(one.snapshot()));
+      for (Simulation* each : {&one, &other, &restored, &passing})
+        ASSERT_TRUE(each->advance_frame());
+      ASSERT_EQ(positions(one), positions(other)) << frame;
+      ASSERT_EQ(positions(one), positions(restored)) << frame;
+      same += positions(one) == positions(passing) ? 1 : 0;
+    }
+    EXPECT_LT(same, 5) << "they met";
+  }
+}
+
 // Bit for bit: one that is folded over swings together, of which nothing is near to begin with.
 TEST(ClothContact, MissesNoPairOfASheetThatSwingsTogetherFromAfar) {
   for (SheetDefinition sheet : {soft_rectangle(0.16, 0.08), soft_lattice(17, 9)}) {

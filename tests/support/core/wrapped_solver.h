@@ -29,6 +29,7 @@ class WrappedSolver : public SheetSolver {
   void measure() override { solver_->measure(); }
   double moved() const override { return solver_->moved(); }
   double pushed() const override { return solver_->pushed(); }
+  double take_change() override { return solver_->take_change(); }
   void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
             Eigen::Ref<Matrix3Xd> d) const override {
     solver_->read(particles, x, d);

@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using Sessions = Service::Sessions;
-using std::chrono::milliseconds, std::chrono::seconds;
+using std::chrono::seconds;
 
 // Where it hangs is chance: here, where it has locked a session and not said what becomes of it.
 TEST_F(Fleet, TakesASessionFromAServerThatHangsInATransaction) {
@@ -75,7 +75,7 @@ TEST_F(Fleet, MovesNoSessionWhenAServerComesOrTheDatabaseIsRestarted) {
     nobodys.set_name("sessions/nobodys");
     return get_error(*c, nobodys).code;
   };
-  while (asked() != grpc::StatusCode::NOT_FOUND) std::this_thread::sleep_for(milliseconds(5));
+  while (asked() != grpc::StatusCode::NOT_FOUND) ask_later();
   std::this_thread::sleep_for(seconds(4));  // longer than a lease
   EXPECT_EQ(a->info().sessions(), 5);
   EXPECT_EQ(b->info().sessions() + c->info().sessions(), 0);

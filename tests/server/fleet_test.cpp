@@ -123,7 +123,7 @@ TEST_F(Fleet, GoesOnWithARunThatNobodyAsksForWhenItsServerDies) {
   const auto b = server("b");
   ASSERT_EQ(b->info().sessions(), 0);
   a.kill();
-  while (b->info().sessions() == 0) std::this_thread::sleep_for(milliseconds(5));
+  while (b->info().sessions() == 0) ask_later();
   EXPECT_EQ(insist(*b, session).state(), v1::SESSION_STATE_RUNNING);
 }
 
@@ -177,7 +177,7 @@ TEST_F(Fleet, HasASessionThatNobodyUsedWhereItIsNamedNext) {
   const auto b = server("b");
   const v1::Session session = a.create(small_scene(), "curtain");
   a.step(session, 12);
-  while (a.info().sessions() > 0) std::this_thread::sleep_for(milliseconds(5));
+  while (a.info().sessions() > 0) ask_later();
   EXPECT_EQ(b->create_error(small_scene(), "curtain").code, grpc::StatusCode::ALREADY_EXISTS);
   EXPECT_EQ(insist(*b, session).replica(), "b");
   EXPECT_EQ(b->get(session).frame(), 12);

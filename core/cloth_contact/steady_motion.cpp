@@ -41,8 +41,9 @@ void SteadyMotion::begin(const Matrix3Xd& from, const Matrix3Xd& to, int steps, 
 
 void SteadyMotion::measure(const Matrix3Xd& x, const Matrix3Xd& d, ThreadPool& pool) {
   if (steps_ == 0) return;
+  const auto taken = static_cast<double>(taken_);
   const auto beside = [&](Eigen::Index i) -> Eigen::Array3d {
-    return x.col(i) - from_.col(i) - taken_ * by_.col(i);
+    return x.col(i) - from_.col(i) - taken * by_.col(i);
   };
   const auto difference = [&](Eigen::Index i) -> Eigen::Array3d { return d.col(i) - by_.col(i); };
   strays_ = std::min(strays_, spread(pool, x.cols(), beside));

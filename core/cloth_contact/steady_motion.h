@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "core/model/mesh.h"
 #include "core/motion/thread_pool.h"
 
@@ -32,9 +34,10 @@ class SteadyMotion {
 
  private:
   Matrix3Xd from_, by_;  // m; in a step
-  int steps_ = 0, taken_ = 0;
-  double differs_ = 0;  // the last step, m
-  double strays_ = 0;   // m
+  int steps_ = 0;
+  std::int64_t taken_ = 0;  // grows as long as anything is near
+  double differs_ = 0;      // the last step, m
+  double strays_ = 0;       // m
 };
 
 }  // namespace weft

@@ -116,7 +116,9 @@ class LatticeSolver : public SheetSolver {
       const double gap =
           may_cross ? resolve_in_parts(contacts, row)
                     : resolve_row(contacts, origin_, law_.compensated, row, known_, state_);
-      if (motion_.measures()) motion_.push(row, before, particles_in(row));
+      if (motion_.measures())
+        gap < 0 || may_cross ? motion_.push(row, before, particles_in(row))
+                             : motion_.push_none(row);
       return gap;
     });
     motion_.pushed(gaps_.looked_at());

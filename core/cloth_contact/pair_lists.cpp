@@ -18,15 +18,23 @@ std::span<T> part_of(std::vector<T>& all, std::int64_t begin, std::int64_t end) 
 std::array<Eigen::Index, 3> far_corners(const Matrix3Xd& at) {
   const auto farthest = [&](const auto& squared) {
     Eigen::Index number = 0;
-    squared.maxCoeff(&number);
+    double most = -1;
+    for (Eigen::Index k = 0; k < at.cols(); ++k)
+      if (const double far = squared(at.col(k)); far > most) {
+        most = far;
+        number = k;
+      }
     return number;
   };
-  const Eigen::Index one = farthest((at.colwise() - at.rowwise().mean()).colwise().squaredNorm());
-  const Matrix3Xd ways = at.colwise() - at.col(one);
-  const Eigen::Index other = farthest(ways.colwise().squaredNorm());
-  const Vector3d along = ways.col(other).normalized();
-  const Eigen::Index out =
-      farthest((ways - along * (along.transpose() * ways)).colwise().squaredNorm());
+  const Vector3d middle = at.rowwise().mean();
+  const Eigen::Index one = farthest([&](const Vector3d& x) { return (x - middle).squaredNorm(); });
+  const Vector3d from = at.col(one);
+  const Eigen::Index other = farthest([&](const Vector3d& x) { return (x - from).squaredNorm(); });
+  const Vector3d along = (at.col(other) - from).normalized();
+  const Eigen::Index out = farthest([&](const Vector3d& x) {
+    const Vector3d way = x - from;
+    return (way - along.dot(way) * along).squaredNorm();
+  });
   return {one, other, out};
 }
 
@@ -56,13 +64,6 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& 
   std::vector<std::size_t> closer;  // of apart_
   if (before_.cols() > 0) {
     since_.set(before_, from, pool);
-    for_shares(pool, std::ssize(states_), kLeastShare, [&](std::int64_t begin, std::int64_t end) {
-      for (State& state : part_of(states_, begin, end)) {
-        const double by = since_.between(number(state.blocks.one), number(state.blocks.other));
-        state.left -= by;
-        state.near_left -= by;
-      }
-    });
     const auto find_closer = [&](std::int64_t begin, std::int64_t end,
                                  std::vector<std::size_t>& found) {
       for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
@@ -75,16 +76,22 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& 
     closer = find_in_shares<std::size_t>(pool, std::ssize(apart_), kLeastShare, find_closer);
   }
   meet(closer);
-  before_ = from;
 
   const auto find_due = [&](std::int64_t begin, std::int64_t end, std::vector<std::size_t>& found) {
     for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
       State& state = states_[k];
-      state.came = came(number(state.blocks.one), number(state.blocks.other));
+      const int one = number(state.blocks.one), other = number(state.blocks.other);
+      if (before_.cols() > 0) {
+        const double by = since_.between(one, other);
+        state.left -= by;
+        state.near_left -= by;
+      }
+      state.came = came(one, other);
       if (is_due(state)) found.push_back(k);
     }
   };
   auto due = find_in_shares<std::size_t>(pool, std::ssize(states_), kLeastShare, find_due);
+  before_ = from;
   const std::size_t shares = shares_of(pool, std::ssize(due), kLeastCloser);
   if (scratch_.size() < shares) scratch_.resize(shares);
   run_shares(pool, shares, std::ssize(due),
@@ -275,11 +282,11 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
 
 void PairLists::renew(const Matrix3Xd& x, double least, double reach, Scratch& scratch,
                       State& state, List& list) {
-  if (list.made_at.cols() > 0) state.left = list.reach - change(x, state.blocks, list, scratch.now);
+  if (list.reach > 0) state.left = list.reach - change(x, state.blocks, list, scratch.now);
   if (state.left >= least) return;
   constexpr int kMostBent = 7;
   constexpr double kBeyondJoined = 0.3, kBeyond = 1.4;
-  list = {};
+  list.reach = 0;
   state.has_some = state.is_near = false;
   state.near_left = -1;
   // what is bent stays so for a while

@@ -55,8 +55,8 @@ class PairLists {
     int bent = 0, bent_for = 0;  // how often it is not asked whether they lie flat
   };
   struct List {
-    double reach = 0;                          // when it was made, m
-    Matrix3Xd made_at = {};                    // of the particles of both blocks, m; or empty
+    double reach = 0;                          // when it was made, m; 0: it was not
+    Matrix3Xd made_at = {};                    // of the particles of both blocks, m
     std::array<Eigen::Index, 3> corners = {};  // of these, far from each other
     Candidates all = {}, near = {};
   };

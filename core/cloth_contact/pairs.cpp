@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "core/cloth_contact/pair_batch.h"
@@ -45,18 +44,40 @@ std::array<int, 4> particles_of_edges(const Cloth& cloth, const ClothPair& pair)
   return {a, b, c, d};
 }
 
-// Calls f(pair, its squared distance at x, m^2) for all pairs of a kind.
-template <class Pair, class Particles, class F>
-void for_each_distance(bool edges, const std::vector<Pair>& pairs, const Particles& particles,
-                       const Matrix3Xd& x, const F& f) {
-  PairBatch batch(edges, x);
-  for (std::size_t begin = 0; begin < pairs.size(); begin += batch.size()) {
-    batch.clear();
-    for (std::size_t n = begin; n < pairs.size() && !batch.full(); ++n)
-      batch.add(particles(pairs[n]));
-    batch.solve();
-    for (std::size_t n = 0; n < batch.size(); ++n) f(pairs[begin + n], batch.squared(n));
+// Calls f(pair, its squared distance at x, m^2) for all pairs of a kind that are added, in their
+// order, until it is finished.
+template <class Pair, class F>
+class Distances {
+ public:
+  Distances(bool edges, const Matrix3Xd& x, const F& f) : batch_(edges, x), f_(f) {}
+
+  void add(const Pair& pair, const std::array<int, 4>& particles) {
+    pairs_[batch_.size()] = pair;
+    batch_.add(particles);
+    if (batch_.full()) finish();
   }
+  void finish() {
+    batch_.solve();
+    for (std::size_t n = 0; n < batch_.size(); ++n) f_(pairs_[n], batch_.squared(n));
+    batch_.clear();
+  }
+
+ private:
+  PairBatch batch_;
+  const F& f_;
+  std::array<Pair, PairBatch::kMost> pairs_;
+};
+
+// Keeps a pair if it is nearer than its thickness and `reach`, else lowers `reach_of_others` to
+// what keeps it so, m.
+template <class Pair>
+void keep_nearer(const Pair& pair, double squared, double thickness, double reach,
+                 std::vector<Pair>& kept, double& reach_of_others) {
+  const double within = thickness + reach, others = thickness + reach_of_others;
+  if (within > 0 && squared < within * within)
+    kept.push_back(pair);
+  else if (squared < others * others)
+    reach_of_others = std::sqrt(squared) - thickness;
 }
 
 // Whether they come within `reach` of each other along every axis.
@@ -85,21 +106,17 @@ Candidates candidates_of(const Cloth& cloth, const ClothPairs& pairs) {
 
 void nearer(const Candidates& candidates, const Matrix3Xd& x, double reach, Candidates& near,
             double& reach_of_others) {
-  double least = std::numeric_limits<double>::infinity();
-  const auto particles = [](const Candidate& candidate) { return candidate.particle; };
   for (const bool edges : {false, true}) {
     std::vector<Candidate>& to = edges ? near.edges : near.corners;
     to.clear();
-    for_each_distance(edges, edges ? candidates.edges : candidates.corners, particles, x,
-                      [&](const Candidate& candidate, double squared) {
-                        const double within = candidate.thickness + reach;
-                        if (squared < within * within)
-                          to.push_back(candidate);
-                        else
-                          least = std::min(least, std::sqrt(squared) - candidate.thickness);
-                      });
+    const auto keep = [&](const Candidate* candidate, double squared) {
+      keep_nearer(*candidate, squared, candidate->thickness, reach, to, reach_of_others);
+    };
+    Distances<const Candidate*, decltype(keep)> distances(edges, x, keep);
+    for (const Candidate& candidate : edges ? candidates.edges : candidates.corners)
+      distances.add(&candidate, candidate.particle);
+    distances.finish();
   }
-  reach_of_others = std::min(reach_of_others, least);
 }
 
 double thickness_of_corner(const Cloth& cloth, int particle, int triangle) {
@@ -166,36 +183,30 @@ std::map<BlockPair, ClothPairs> all_pairs(const Cloth& cloth) {
 ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blocks,
                       const Matrix3Xd& x, double reach, double& reach_of_others,
                       NearBlocks::Search& search) {
-  ClothPairs some, found;
+  ClothPairs found;
   const double boxes_within = cloth.thickest + reach_of_others;
+  const auto keep_corner = [&](const ClothPair& pair, double squared) {
+    keep_nearer(pair, squared, thickness_of_corner(cloth, pair.first, pair.second), reach,
+                found.corners, reach_of_others);
+  };
+  Distances<ClothPair, decltype(keep_corner)> corners(false, x, keep_corner);
   const auto add_corners = [&](int one, int other) {
     for (const ClothPair& pair : near.near_corners(one, other, boxes_within, search))
-      if (!has(corners_of(cloth, pair.second), pair.first)) some.corners.push_back(pair);
+      if (!has(corners_of(cloth, pair.second), pair.first))
+        corners.add(pair, particles_of_corner(cloth, pair));
   };
   add_corners(blocks.one, blocks.other);
   if (blocks.one != blocks.other) add_corners(blocks.other, blocks.one);
+  corners.finish();
+  const auto keep_edges = [&](const ClothPair& pair, double squared) {
+    keep_nearer(pair, squared, thickness_of_edges(cloth, pair.first, pair.second), reach,
+                found.edges, reach_of_others);
+  };
+  Distances<ClothPair, decltype(keep_edges)> edges(true, x, keep_edges);
   for (const ClothPair& pair : near.near_edges(blocks, boxes_within, search))
     if (!share_end(ends_of(cloth, pair.first), ends_of(cloth, pair.second)))
-      some.edges.push_back(pair);
-  const auto keep = [&](const ClothPair& pair, double squared, double thickness,
-                        std::vector<ClothPair>& kept) {
-    const double within = thickness + reach, others = thickness + reach_of_others;
-    if (within > 0 && squared < within * within)
-      kept.push_back(pair);
-    else if (squared < others * others)
-      reach_of_others = std::sqrt(squared) - thickness;
-  };
-  for_each_distance(
-      false, some.corners, [&](const ClothPair& pair) { return particles_of_corner(cloth, pair); },
-      x,
-      [&](const ClothPair& pair, double squared) {
-        keep(pair, squared, thickness_of_corner(cloth, pair.first, pair.second), found.corners);
-      });
-  for_each_distance(
-      true, some.edges, [&](const ClothPair& pair) { return particles_of_edges(cloth, pair); }, x,
-      [&](const ClothPair& pair, double squared) {
-        keep(pair, squared, thickness_of_edges(cloth, pair.first, pair.second), found.edges);
-      });
+      edges.add(pair, particles_of_edges(cloth, pair));
+  edges.finish();
   std::sort(found.corners.begin(), found.corners.end());
   std::sort(found.edges.begin(), found.edges.end());
   return found;

@@ -180,7 +180,9 @@ void Separation::keep_given() {
 // Its place in given_, or the size of that. First looks at `next`.
 std::size_t Separation::find_given(const PairContact& contact, std::size_t next) const {
   const auto is = [&](const Given& given) {
-    return given.particle == contact.particle && given.edges == contact.edges;
+    const auto& [a, b, c, d] = given.particle;
+    const auto& [i, j, k, l] = contact.particle;
+    return a == i && b == j && c == k && d == l && given.edges == contact.edges;
   };
   if (next < given_.size() && is(given_[next])) return next;
   if (given_.empty()) return 0;

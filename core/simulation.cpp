@@ -138,12 +138,19 @@ bool Simulation::State::begin_frame(bool in_parts, ThreadPool& pool) {
 Attempt Simulation::State::inspect_sheets(NextStates& next, ThreadPool& pool) {
   const double begin = time();
   Attempt made;
+  // what hits a sheet may leave it all its motion
+  double given = 0;
+  if (cloth_contact) {
+    given = cloth_contact->given();
+    for (const MovingSheet& sheet : sheets) given += sheet.good().kinetic_energy;
+  }
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     MovingSheet& sheet = sheets[s];
     sheet.read(next[s]);
     const Drive drive{sheet.dynamics.gravity,
                       drive_speed(scene, scene.sheets[s], begin, begin + scene.solver.frame_step),
-                      scene.solver.frame_step};
+                      scene.solver.frame_step,
+                      cloth_contact ? given - sheet.good().kinetic_energy : 0};
     made.sheets.push_back(
         scene.solver.max_repairs == 0
             ? inspect_finite(next[s])
@@ -216,6 +223,7 @@ void Simulation::State::forget_motion(bool stays) {
 bool Simulation::State::keep_to_budget(NextStates& next) {
   if (scene.solver.max_repairs == 0) return true;
   const double begin = time(), frame_step = scene.solver.frame_step;
+  const double led = cloth_contact ? cloth_contact->given() : 0;
   double stored = 0;
   if (cloth_contact)
     for (const MovingSheet& sheet : sheets) stored += sheet.budget.stored;
@@ -226,7 +234,7 @@ bool Simulation::State::keep_to_budget(NextStates& next) {
     EnergyBudget& budget = sheets[s].budget;
     const Drive drive{sheets[s].dynamics.gravity,
                       motion_speed(scene, definition, begin, begin + frame_step), frame_step};
-    budget.given += work_of_motion(mesh, drive, budget.stored);
+    budget.given += work_of_motion(mesh, drive, budget.stored) + led;
     budget.substeps += plan.step.substeps;
     if (budget.substeps < kAuditSubsteps) continue;
     const std::string why = audit(mesh, drive, height_of(definition), wind_speed(scene),

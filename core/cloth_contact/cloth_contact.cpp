@@ -93,7 +93,7 @@ void ClothContact::resolve(std::span<MovingSheet> sheets, double dt, bool ends_f
   // the begin of a window of one step told where it ends, unless pairs are led apart meanwhile
   const bool is_read = window_.steps == 1 && untangling_.empty();
   window_ = {.most_steps = ends_frame ? 1 : most_steps(scene_.solver, dt, halvings_)};
-  untangling_.lead(sheets, dt);
+  given_ += untangling_.lead(sheets, dt);
   if (is_known) {
     if (!is_read) read(sheets, pool);
     act(sheets, past, ends_frame, pool);
@@ -241,6 +241,7 @@ void ClothContact::begin_frame(std::span<const MovingSheet> sheets, int halvings
   const bool was_empty = untangling_.empty();
   untangling_.clear();
   has_met_ = false;
+  given_ = 0;
   if (speed > 0)
     if (const std::vector<ClothPair>& cuts = cuts_of_last(sheets, pool); !cuts.empty())
       untangling_.set(cuts, good_positions(sheets), speed);

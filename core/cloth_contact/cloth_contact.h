@@ -48,6 +48,8 @@ class ClothContact {
   void resolve(std::span<MovingSheet> sheets, double dt, bool ends_frame, ThreadPool& pool);
   // How far that moved a particle at most, m.
   double moved() const { return corrected_; }
+  // The energy that leading cuts apart gave in this frame, J.
+  double given() const { return given_; }
   // After resolve(): something else moved particles by so much at most, m.
   void follow(double moved) { come_ += 2 * moved; }
 
@@ -95,6 +97,7 @@ class ClothContact {
   double corrected_ = 0;  // how far contact moved a particle in the last step at most, m
   int halvings_ = 0;      // of windows in this frame
   bool has_met_ = false;  // whether anything may have in it
+  double given_ = 0;      // in it, J
 
   std::vector<double> inverse_mass_;  // of all particles, 1/kg
   Matrix3Xd begin_, x_, d_;           // where the window began; now, and in the last step, m

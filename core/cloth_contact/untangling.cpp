@@ -100,8 +100,9 @@ void Untangling::add(int edge, int triangle, const Around& around, const Matrix3
                     speed * turn / std::hypot(turn, kHalfTurn)});
 }
 
-void Untangling::lead(std::span<MovingSheet> sheets, double dt) const {
+double Untangling::lead(std::span<MovingSheet> sheets, double dt) const {
   constexpr double kLeastMoves = 0.01;  // of its lightest particle's 1 / mass
+  double given = 0;
   for (const Pair& pair : pairs_) {
     double speed = 0, moves = 0, lightest = 0;  // m/s; 1/kg
     std::array<double, 5> share{};
@@ -121,6 +122,7 @@ void Untangling::lead(std::span<MovingSheet> sheets, double dt) const {
     const double missing = pair.speed - speed;
     // where nearly all is held, what is free would be thrown
     if (missing <= 0 || moves <= kLeastMoves * lightest) continue;
+    given += missing / moves * std::max(speed + missing / 2, 0.0);
     x.setZero();
     for (std::size_t n = 0; n < share.size(); ++n) {
       if (share[n] == 0) continue;
@@ -129,6 +131,7 @@ void Untangling::lead(std::span<MovingSheet> sheets, double dt) const {
       sheet_of(pair.particle[n]).solver->displace({&own, 1}, x, d);
     }
   }
+  return given;
 }
 
 }  // namespace weft

@@ -27,9 +27,9 @@ class Untangling {
   bool empty() const { return pairs_.empty(); }
   // Whether all of these particles are at cuts: what they are to keep apart may be on wrong sides.
   bool has(const std::array<int, 4>& particles) const;
-  // Has edges and triangles move apart in the step to come, which takes dt, s. What one is given is
-  // taken from the other.
-  void lead(std::span<MovingSheet> sheets, double dt) const;
+  // Has edges and triangles move apart in the step to come, which takes dt, s. What momentum one is
+  // given is taken from the other. Returns the energy that it gave them, J.
+  double lead(std::span<MovingSheet> sheets, double dt) const;
 
  private:
   // An edge and a triangle that it passes through.

@@ -24,6 +24,7 @@ struct Drive {
   Vector3d gravity = Vector3d::Zero();  // m/s^2
   double speed = 0;                     // the fastest of its pins, the colliders and the wind, m/s
   double frame_step = 0;                // s
+  double given = 0;                     // to all cloth that may touch it, by other things, J
 };
 
 // The fastest that pins and colliders move between two times, m/s.
@@ -44,7 +45,7 @@ struct Inspection {
 // Looks for a sheet that diverged: a position or velocity that is not finite; a strain above
 // `most_strain`; energy (kinetic, elastic and gravity) that grew by more than the sheet had at
 // `before`, as motion and elastic energy, plus 10 M (u^2 + (g T)^2), u the speed of the drive and T
-// the frame step. Energies are added up only where the kinetic one calls for it.
+// the frame step, and what was given. Energies are added up only where the kinetic one calls for it.
 Inspection inspect(const Mesh& mesh, const Drive& drive, double most_strain,
                    const SheetState& before, const SheetState& after);
 

@@ -197,6 +197,9 @@ TEST(Guard, EnergyMayGrowByWhatTheSheetHadAndByWhatDrivesIt) {
   EXPECT_NE(reason(weight, still, moving(1)), "");
   EXPECT_EQ(reason(pulled, still, moving(4)), "") << "twice the speed of a pin";
   EXPECT_NE(reason(pulled, still, moving(40)), "");
+  const Drive hit{{0, 0, 0}, 0, 0.01, kinetic_energy(mesh, moving(1).v)};
+  EXPECT_EQ(reason(hit, still, moving(1)), "") << "what hits it may leave it all its motion";
+  EXPECT_NE(reason(hit, still, moving(1.1)), "");
   EXPECT_EQ(reason(none, moving(1), moving(1.4)), "") << "less than twice the energy";
   EXPECT_NE(reason(none, moving(1), moving(2)), "");
 }

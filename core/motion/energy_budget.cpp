@@ -43,7 +43,8 @@ std::string audit(const Mesh& mesh, const Drive& drive, double height, double wi
 
   const double given = budget.given + others + kWindShare * mass * wind * wind;
   const double tolerance =
-      kStoredShare * budget.stored + kWeightShare * mass * drive.gravity.norm() * height;
+      kStoredShare * budget.stored +
+      mass * (kWeightShare * drive.gravity.norm() * height + kStillSpeed * kStillSpeed);
   std::string reason;
   if (budget.least > budget.limit + given + tolerance)
     reason = join("energy rose by ", budget.least - budget.limit, " J in ", kAudits,

@@ -84,7 +84,8 @@ Inspection inspect(const Mesh& mesh, const Drive& drive, double most_strain,
   // energy cannot have grown much unless motion did
   const double mass = mesh.mass.sum();
   const double fall = drive.gravity.norm() * drive.frame_step;
-  const double driven = 10 * mass * (drive.speed * drive.speed + fall * fall) + drive.given;  // J
+  const double speed = std::max(drive.speed, kStillSpeed);
+  const double driven = 10 * mass * (speed * speed + fall * fall) + drive.given;  // J
   const double kinetic = after.kinetic_energy, kinetic_before = before.kinetic_energy;
   if (kinetic <= 2 * kinetic_before + driven && found.reason.empty()) return found;
   const double elastic_before = elastic_energy(mesh, before.x);

@@ -11,6 +11,9 @@ inline constexpr double kFarthest = 1e9;
 // Largest strain of a frame, unless the start or a motion that was confirmed had half of its own.
 inline constexpr double kMostStrain = 10;
 
+// What rounding may bring a sheet to that lies still, m/s.
+inline constexpr double kStillSpeed = 1e-3;
+
 // A sheet at the end of a frame. (3 x particles)
 struct SheetState {
   Matrix3Xd x;                // m
@@ -44,8 +47,9 @@ struct Inspection {
 
 // Looks for a sheet that diverged: a position or velocity that is not finite; a strain above
 // `most_strain`; energy (kinetic, elastic and gravity) that grew by more than the sheet had at
-// `before`, as motion and elastic energy, plus 10 M (u^2 + (g T)^2), u the speed of the drive and T
-// the frame step, and what was given. Energies are added up only where the kinetic one calls for it.
+// `before`, as motion and elastic energy, plus 10 M (u^2 + (g T)^2), u the speed of the drive, at
+// least kStillSpeed, and T the frame step, and what was given. Energies are added up only where the
+// kinetic one calls for it.
 Inspection inspect(const Mesh& mesh, const Drive& drive, double most_strain,
                    const SheetState& before, const SheetState& after);
 

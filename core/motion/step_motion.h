@@ -21,7 +21,8 @@ struct Largest {
 // How far the particles of a sheet come in a step, and how much that changes, at most, m.
 class StepMotion {
  public:
-  // From now on also of what is held, and of what colliders move, in so many parts of the sheet.
+  // From now on also how much it changes, of what is held, and of what colliders move, in so many
+  // parts of the sheet.
   void measure(std::size_t parts) {
     measures_ = true;
     pushes_.resize(parts);
@@ -49,7 +50,7 @@ class StepMotion {
   void displace(const Eigen::Ref<const Matrix3Xd>& by, const Eigen::Ref<const Matrix3Xd>& in_step) {
     const double moved = farthest(by);
     moved_ += moved;
-    changed_ += moved + farthest(in_step);
+    if (measures_) changed_ += moved + farthest(in_step);
   }
   // Colliders moved the particles of a part, from where they were; threads may say so, each of
   // other parts.

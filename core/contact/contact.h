@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -25,6 +27,18 @@ Distance distance(const SharedBody& body, const Vector3d& point);
 // posed: the body as it was placed for that time, where it has left its first pose.
 Distance distance(const Collider& collider, const Vector3d& point, double time,
                   const PosedBody* posed = nullptr);
+
+// Of particles whose contact was resolved: how far the nearest was from a skin, below 0 where one
+// was moved; how far they were moved, and how much their displacements changed, at most, m.
+struct Resolved {
+  double gap = std::numeric_limits<double>::infinity();
+  double moved = 0, changed = 0;
+
+  void move(double by, double in_step) {
+    moved = std::max(moved, by);
+    changed = std::max(changed, in_step);
+  }
+};
 
 // The colliders of a scene during one step, as a sheet meets them.
 class Contacts {

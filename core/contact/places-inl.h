@@ -9,6 +9,7 @@
 #include <hwy/highway.h>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -264,6 +265,38 @@ HWY_INLINE Distances distances(const Contacts::Placed& placed, const Places& poi
   if (const auto* body = std::get_if<SharedBody>(&shape)) return distances((*body)->grid, at);
   return distances(*std::get_if<Capsule>(&shape), placed.turn, at);
 }
+
+// As values of T keep it.
+template <class T>
+HWY_INLINE Reals rounded(Reals v) {
+  if constexpr (sizeof(T) == sizeof(double)) {
+    return v;
+  } else {
+    const hn::Rebind<T, ContactTag> d;
+    return hn::PromoteTo(ContactTag(), hn::DemoteTo(d, v));
+  }
+}
+template <class T>
+HWY_INLINE Places rounded(const Places& v) {
+  return {rounded<T>(v.x), rounded<T>(v.y), rounded<T>(v.z)};
+}
+
+// Of vectors of particles, so far; see Resolved.
+struct ResolvedPlaces {
+  Reals gap;
+  Reals moved, changed;  // squared, m^2
+
+  template <class M>
+  HWY_INLINE void move(M touching, const Places& by, const Places& in_step) {
+    moved = hn::Max(moved, hn::IfThenElseZero(touching, squared(by)));
+    changed = hn::Max(changed, hn::IfThenElseZero(touching, squared(in_step)));
+  }
+  HWY_INLINE Resolved all() const {
+    const ContactTag d;
+    return {hn::GetLane(hn::MinOfLanes(d, gap)), std::sqrt(hn::GetLane(hn::MaxOfLanes(d, moved))),
+            std::sqrt(hn::GetLane(hn::MaxOfLanes(d, changed)))};
+  }
+};
 
 // Displacement of the surface near points in the step. What leads out is as the distance changes.
 HWY_INLINE Places carried_at(const Contacts::Placed& placed, const Places& x, const Places& normal,

@@ -30,18 +30,11 @@ struct Stored {
     else
       hn::Store(hn::DemoteTo(d, v), d, to);
   }
-  static HWY_INLINE Reals rounded(Reals v) {
-    const hn::Rebind<T, ContactTag> d;
-    if constexpr (sizeof(T) == sizeof(double))
-      return v;
-    else
-      return hn::PromoteTo(ContactTag(), hn::DemoteTo(d, v));
-  }
 };
 
 template <class T>
-double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                      std::span<KnownCells> known, SweepState<T>& state) {
+Resolved resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                        std::span<KnownCells> known, SweepState<T>& state) {
   using State = SweepState<T>;
   using Of = Stored<T>;
   constexpr int kLanes = LatticeLayout<T>::kLanes, kGroup = KnownCells::kParticles,
@@ -49,7 +42,7 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
   const int step = static_cast<int>(hn::Lanes(ContactTag()));
   const Places from = everywhere(origin);
   const Reals far = real(std::numeric_limits<double>::infinity());
-  Reals nearest = far;
+  ResolvedPlaces all{far, real(0), real(0)};
   for (int j = 0; j < state.vectors(); ++j) {
     for (int part = 0; part < kLanes; part += step) {
       T* const shared = state.shared(row) + j * State::kSharedStride + part;
@@ -72,11 +65,11 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
           gaps(contacts, x, known.empty() ? nullptr : &known[static_cast<std::size_t>(group)],
                static_cast<std::size_t>(part % kGroup));
       const Reals gap = hn::IfThenElse(free, found.least, far);
-      nearest = hn::Min(nearest, gap);
+      all.gap = hn::Min(all.gap, gap);
       const auto touching = hn::Lt(gap, real(0));
       if (hn::AllFalse(ContactTag(), touching)) continue;
 
-      const Places before = exact(State::kD, State::kDError);
+      const Places place = minus(x, from), before = exact(State::kD, State::kDError);
       Places d = before;
       resolve_places(contacts, touching, found.first, x, d);
 
@@ -85,9 +78,11 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
       };
       const auto set = [&](int plane, int error, Reals v) HWY_ATTR {
         store(plane, v);
-        if (compensated) store(error, hn::Sub(Of::rounded(v), v));
+        if (compensated) store(error, hn::Sub(rounded<T>(v), v));
       };
       const Places relative = minus(x, from);
+      const auto kept = [&](const Places& v) HWY_ATTR { return compensated ? v : rounded<T>(v); };
+      all.move(touching, minus(kept(relative), place), minus(kept(d), before));
       set(State::kX, State::kXError, relative.x);
       set(State::kX + 1, State::kXError + 1, relative.y);
       set(State::kX + 2, State::kXError + 2, relative.z);
@@ -95,20 +90,20 @@ double resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool com
       set(State::kD + 1, State::kDError + 1, d.y);
       set(State::kD + 2, State::kDError + 2, d.z);
       const Places change = times(minus(d, before), real(double{state.lead()}));
-      store(State::kW, hn::Add(Of::load(at(State::kW)), Of::rounded(change.x)));
-      store(State::kW + 1, hn::Add(Of::load(at(State::kW + 1)), Of::rounded(change.y)));
-      store(State::kW + 2, hn::Add(Of::load(at(State::kW + 2)), Of::rounded(change.z)));
+      store(State::kW, hn::Add(Of::load(at(State::kW)), rounded<T>(change.x)));
+      store(State::kW + 1, hn::Add(Of::load(at(State::kW + 1)), rounded<T>(change.y)));
+      store(State::kW + 2, hn::Add(Of::load(at(State::kW + 2)), rounded<T>(change.z)));
     }
   }
-  return hn::GetLane(hn::MinOfLanes(ContactTag(), nearest));
+  return all.all();
 }
 
-double resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                      std::span<KnownCells> known, SweepState<float>& state) {
+Resolved resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                        std::span<KnownCells> known, SweepState<float>& state) {
   return resolve_row_as(contacts, origin, compensated, row, known, state);
 }
-double resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                      std::span<KnownCells> known, SweepState<double>& state) {
+Resolved resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                        std::span<KnownCells> known, SweepState<double>& state) {
   return resolve_row_as(contacts, origin, compensated, row, known, state);
 }
 
@@ -122,13 +117,13 @@ HWY_EXPORT(resolve_single);
 HWY_EXPORT(resolve_double);
 
 template <>
-double resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                   std::span<KnownCells> known, SweepState<float>& state) {
+Resolved resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                     std::span<KnownCells> known, SweepState<float>& state) {
   return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, row, known, state);
 }
 template <>
-double resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                   std::span<KnownCells> known, SweepState<double>& state) {
+Resolved resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                     std::span<KnownCells> known, SweepState<double>& state) {
   return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, row, known, state);
 }
 

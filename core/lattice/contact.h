@@ -10,9 +10,8 @@ namespace weft {
 
 // Contacts::resolve() for the free particles of a row, in vectors of double. `origin` is what
 // positions are relative to, m. known: of every eight lanes of the sheet's vectors, or nothing.
-// Returns how far the nearest of them was from a skin, m.
 template <class T>
-double resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
-                   std::span<KnownCells> known, SweepState<T>& state);
+Resolved resolve_row(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,
+                     std::span<KnownCells> known, SweepState<T>& state);
 
 }  // namespace weft

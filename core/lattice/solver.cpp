@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -111,15 +110,11 @@ class LatticeSolver : public SheetSolver {
       known_.resize(static_cast<std::size_t>(law_.layout.rows * state_.vectors()) * kGroups);
     }
     gaps_.look(motion_.moved() + contacts.reach(), bands(pool), pool, [&](int row) {
-      const std::vector<Moved> before =
-          motion_.measures() ? particles_in(row) : std::vector<Moved>();
-      const double gap =
+      const Resolved resolved =
           may_cross ? resolve_in_parts(contacts, row)
                     : resolve_row(contacts, origin_, law_.compensated, row, known_, state_);
-      if (motion_.measures())
-        gap < 0 || may_cross ? motion_.push(row, before, particles_in(row))
-                             : motion_.push_none(row);
-      return gap;
+      motion_.push(row, resolved.moved, resolved.changed);
+      return resolved.gap;
     });
     motion_.pushed(gaps_.looked_at());
   }
@@ -280,31 +275,23 @@ class LatticeSolver : public SheetSolver {
   void set_displacement(Place at, const Vector3d& d) { set(State::kD, State::kDError, at, d); }
 
   // As resolve_row(), where particles may come through colliders unseen.
-  double resolve_in_parts(const Contacts& contacts, int row) {
-    double nearest = std::numeric_limits<double>::infinity();
+  Resolved resolve_in_parts(const Contacts& contacts, int row) {
+    Resolved resolved;
     for (int c = 0; c < columns_; ++c) {
       const Place at = state_.place(row, c);
       if (at[State::kStep2] == 0) continue;
       Vector3d x = position(at), d = displacement(at);
-      const Vector3d before = d;
+      const Vector3d from = x, before = d;
       if (contacts.resolve(x, d)) {
         set_position(at, x);
         set_displacement(at, d);
         for (int axis = 0; axis < 3; ++axis)
           at[State::kW + axis] += static_cast<T>(state_.lead() * (d[axis] - before[axis]));
+        resolved.move((position(at) - from).norm(), (displacement(at) - before).norm());
       }
-      nearest = std::min(nearest, contacts.gap(x));
+      resolved.gap = std::min(resolved.gap, contacts.gap(x));
     }
-    return nearest;
-  }
-
-  std::vector<Moved> particles_in(int row) {
-    std::vector<Moved> particles;
-    for (int c = 0; c < columns_; ++c) {
-      const Place at = state_.place(row, c);
-      particles.push_back({position(at), displacement(at)});
-    }
-    return particles;
+    return resolved;
   }
 
   // Drag over mass is one for all particles: both go by area, 1/s.

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/motion/tethers.h"
+#include "core/model/mesh.h"
 
 namespace weft {
 
@@ -27,7 +27,6 @@ class StepMotion {
     measures_ = true;
     pushes_.resize(parts);
   }
-  bool measures() const { return measures_; }
   void start() { pushed_ = changed_ = 0; }
 
   template <class T>
@@ -52,17 +51,11 @@ class StepMotion {
     moved_ += moved;
     if (measures_) changed_ += moved + farthest(in_step);
   }
-  // Colliders moved the particles of a part, from where they were; threads may say so, each of
-  // other parts.
-  void push(int part, std::span<const Moved> before, std::span<const Moved> now) {
-    double x = 0, d = 0;
-    for (std::size_t k = 0; k < now.size(); ++k) {
-      x = std::max(x, (now[k].x - before[k].x).squaredNorm());
-      d = std::max(d, (now[k].d - before[k].d).squaredNorm());
-    }
-    pushes_[static_cast<std::size_t>(part)] = {std::sqrt(x), std::sqrt(d)};
+  // Colliders moved particles of a part by so much, and their displacements, at most; threads may
+  // say so, each of other parts.
+  void push(int part, double x, double d) {
+    if (measures_) pushes_[static_cast<std::size_t>(part)] = {x, d};
   }
-  void push_none(int part) { pushes_[static_cast<std::size_t>(part)] = {}; }
   // Of all parts that colliders were near.
   void pushed(std::span<const int> parts) {
     pushed_ = 0;

@@ -40,15 +40,15 @@ HWY_INLINE Places load_places(const T* from) {
 }
 
 template <class T>
-double resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                      std::span<KnownCells> known, TriangleState<T>& state) {
+Resolved resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                        std::span<KnownCells> known, TriangleState<T>& state) {
   const ContactTag d;
   KnownCells* const cells = known.empty() ? nullptr : &known[static_cast<std::size_t>(run)];
   const Reals far = real(std::numeric_limits<double>::infinity());
   constexpr std::size_t kValues = 4;
   static_assert(kContactRun % Lanes::kMost == 0);
   const std::size_t begin = static_cast<std::size_t>(run) * kContactRun * kValues;
-  Reals nearest = far;
+  ResolvedPlaces all{far, real(0), real(0)};
   for (std::size_t first = begin; first < begin + kContactRun * kValues;
        first += kValues * Lanes::kMost) {
     const auto exact = [&](const AlignedArray<T>& plane, const AlignedArray<T>& error) HWY_ATTR {
@@ -59,18 +59,21 @@ double resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool com
     Places x = plus(everywhere(origin), exact(state.x, state.x_error));
     const Gaps found = gaps(contacts, x, cells, (first - begin) / kValues);
     const Reals gap = hn::IfThenElse(free, found.least, far);
-    nearest = hn::Min(nearest, gap);
+    all.gap = hn::Min(all.gap, gap);
     const auto touching = hn::Lt(gap, real(0));
     if (hn::AllFalse(d, touching)) continue;
 
-    const Places before = exact(state.d, state.d_error);
+    const Places at = x, before = exact(state.d, state.d_error);
     Places moved = before;
     resolve_places(contacts, touching, found.first, x, moved);
+    const auto kept = [&](const Places& v) HWY_ATTR { return compensated ? v : rounded<T>(v); };
+    const Places from = everywhere(origin);
+    all.move(touching, minus(kept(minus(x, from)), minus(at, from)), minus(kept(moved), before));
 
     HWY_ALIGN double touched[Lanes::kMost];
     hn::Store(hn::IfThenElseZero(touching, real(1)), d, touched);
     Lanes place, displacement, change;
-    place.store(minus(x, everywhere(origin)));
+    place.store(minus(x, from));
     displacement.store(moved);
     change.store(times(minus(moved, before), real(double{state.lead})));
     for (std::size_t k = 0; k < Lanes::kMost; ++k) {
@@ -87,15 +90,15 @@ double resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool com
       }
     }
   }
-  return hn::GetLane(hn::MinOfLanes(d, nearest));
+  return all.all();
 }
 
-double resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                      std::span<KnownCells> known, TriangleState<float>& state) {
+Resolved resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                        std::span<KnownCells> known, TriangleState<float>& state) {
   return resolve_run_as(contacts, origin, compensated, run, known, state);
 }
-double resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                      std::span<KnownCells> known, TriangleState<double>& state) {
+Resolved resolve_double(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                        std::span<KnownCells> known, TriangleState<double>& state) {
   return resolve_run_as(contacts, origin, compensated, run, known, state);
 }
 
@@ -109,13 +112,13 @@ HWY_EXPORT(resolve_single);
 HWY_EXPORT(resolve_double);
 
 template <>
-double resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                   std::span<KnownCells> known, TriangleState<float>& state) {
+Resolved resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                     std::span<KnownCells> known, TriangleState<float>& state) {
   return HWY_DYNAMIC_DISPATCH(resolve_single)(contacts, origin, compensated, run, known, state);
 }
 template <>
-double resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                   std::span<KnownCells> known, TriangleState<double>& state) {
+Resolved resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                     std::span<KnownCells> known, TriangleState<double>& state) {
   return HWY_DYNAMIC_DISPATCH(resolve_double)(contacts, origin, compensated, run, known, state);
 }
 

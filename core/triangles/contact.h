@@ -12,10 +12,9 @@ namespace weft {
 inline constexpr std::size_t kContactRun = KnownCells::kParticles;
 
 // Contacts::resolve() for the free particles of a run, in vectors of double. `origin` is what
-// positions are relative to, m. known: of every run, or nothing. Returns how far the nearest of
-// them was from a skin, m: below 0 where one was moved.
+// positions are relative to, m. known: of every run, or nothing.
 template <class T>
-double resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
-                   std::span<KnownCells> known, TriangleState<T>& state);
+Resolved resolve_run(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,
+                     std::span<KnownCells> known, TriangleState<T>& state);
 
 }  // namespace weft

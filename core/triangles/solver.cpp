@@ -1,9 +1,7 @@
 #include "core/triangles/solver.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -103,14 +101,11 @@ class TriangleSolver : public SheetSolver {
     const bool may_cross = contacts.may_cross(motion_.moved());
     if (contacts.first_grid() != nullptr) known_.resize(gaps_.parts());
     gaps_.look(motion_.moved() + contacts.reach(), bands(pool), pool, [&](int run) {
-      const Run before = motion_.measures() ? particles_in(run) : Run();
-      const double gap =
+      const Resolved resolved =
           may_cross ? resolve_in_parts(contacts, run)
                     : resolve_run(contacts, origin_, law_.compensated, run, known_, state_);
-      if (motion_.measures())
-        gap < 0 || may_cross ? motion_.push(run, before, particles_in(run))
-                             : motion_.push_none(run);
-      return gap;
+      motion_.push(run, resolved.moved, resolved.changed);
+      return resolved.gap;
     });
     motion_.pushed(gaps_.looked_at());
   }
@@ -299,15 +294,14 @@ class TriangleSolver : public SheetSolver {
   }
 
   // As resolve_run(), where particles may come through colliders unseen.
-  double resolve_in_parts(const Contacts& contacts, int run) {
+  Resolved resolve_in_parts(const Contacts& contacts, int run) {
     constexpr std::size_t kValues = 4 * kContactRun;
-    double nearest = std::numeric_limits<double>::infinity();
+    Resolved resolved;
     const std::size_t begin = static_cast<std::size_t>(run) * kValues;
     for (std::size_t at = begin; at < begin + kValues; at += 4) {
       if (state_.step2.data()[at] == 0) continue;
-      Vector3d x = position_at(at);
-      Vector3d d = exact(state_.d, state_.d_error, at);
-      const Vector3d before = d;
+      Vector3d x = position_at(at), d = exact(state_.d, state_.d_error, at);
+      const Vector3d from = x, before = d;
       if (contacts.resolve(x, d)) {
         set_at(state_.x, state_.x_error, at, x - origin_);
         set_at(state_.d, state_.d_error, at, d);
@@ -315,19 +309,12 @@ class TriangleSolver : public SheetSolver {
           const auto k = static_cast<Eigen::Index>(axis);
           state_.w.data()[at + axis] += static_cast<T>(state_.lead * (d[k] - before[k]));
         }
+        resolved.move((position_at(at) - from).norm(),
+                      (exact(state_.d, state_.d_error, at) - before).norm());
       }
-      nearest = std::min(nearest, contacts.gap(x));
+      resolved.gap = std::min(resolved.gap, contacts.gap(x));
     }
-    return nearest;
-  }
-
-  using Run = std::array<Moved, kContactRun>;
-  Run particles_in(int run) const {
-    Run particles;
-    const std::size_t begin = 4 * kContactRun * static_cast<std::size_t>(run);
-    for (std::size_t k = 0; k < kContactRun; ++k)
-      particles[k] = {position_at(begin + 4 * k), exact(state_.d, state_.d_error, begin + 4 * k)};
-    return particles;
+    return resolved;
   }
 
   const Mesh& mesh_;

@@ -197,9 +197,9 @@ void expect_rows_like_particles(const std::vector<Collider>& colliders) {
                                 kGroups);
   int touched = 0, i = 0;
   for (int row = 0; row < rows.kRows; ++row) {
-    const double gap =
+    const Resolved resolved =
         resolve_row(contacts, rows.origin, rows.kCompensated, row, known, rows.state);
-    double nearest = std::numeric_limits<double>::infinity();
+    double nearest = std::numeric_limits<double>::infinity(), moved = 0, changed = 0;
     for (int c = 0; c < rows.kColumns; ++c, ++i) {
       Vector3d x = before.x(i), d = before.d(i);
       if (i % 7 != 0) {
@@ -209,6 +209,8 @@ void expect_rows_like_particles(const std::vector<Collider>& colliders) {
                            steepest(colliders[k]));
         touched += contacts.resolve(x, d) ? 1 : 0;
       }
+      moved = std::max(moved, (x - before.x(i)).norm());
+      changed = std::max(changed, (d - before.d(i)).norm());
       EXPECT_LE((rows.x(i) - x).norm(), tolerance) << i;
       EXPECT_LE((rows.d(i) - d).norm(), tolerance) << i;
       for (int axis = 0; axis < 3; ++axis)
@@ -216,7 +218,9 @@ void expect_rows_like_particles(const std::vector<Collider>& colliders) {
                     before.at(rows.state.kW + axis, i) + 3 * (d - before.d(i))[axis],
                     4 * std::numeric_limits<T>::epsilon());
     }
-    EXPECT_NEAR(gap, nearest, 1e-14) << row;
+    EXPECT_NEAR(resolved.gap, nearest, 1e-14) << row;
+    EXPECT_NEAR(resolved.moved, moved, 2 * tolerance) << row;
+    EXPECT_NEAR(resolved.changed, changed, 2 * tolerance) << row;
   }
   EXPECT_GT(touched, 10);
 }

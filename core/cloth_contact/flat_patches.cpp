@@ -62,19 +62,6 @@ bool passes_inside(const std::vector<Vector2d>& polygon, const Vector2d& from, c
   });
 }
 
-// At right angles to each other; the first two lie in a plane that goes both ways.
-Eigen::Matrix3d axes_of(const Eigen::Matrix<double, 3, 2>& ways) {
-  constexpr double kOnALine = 1e-3;  // sine
-  const Vector3d normal = ways.col(0).cross(ways.col(1));
-  if (!(normal.norm() > kOnALine * ways.col(0).norm() * ways.col(1).norm()))
-    return Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d axes;
-  axes.col(0) = ways.col(0).normalized();
-  axes.col(2) = normal.normalized();
-  axes.col(1) = axes.col(2).cross(axes.col(0));
-  return axes;
-}
-
 // Whether no side of `one` has all of the other beyond it.
 bool may_meet(const std::vector<Vector2d>& one, const std::vector<Vector2d>& other) {
   return all_sides(one, [&](const Vector2d& corner, const Vector2d& normal) {
@@ -84,6 +71,18 @@ bool may_meet(const std::vector<Vector2d>& one, const std::vector<Vector2d>& oth
 }
 
 }  // namespace
+
+Eigen::Matrix3d axes_of(const Eigen::Matrix<double, 3, 2>& ways) {
+  constexpr double kOnALine = 1e-3;  // sine
+  const Vector3d normal = ways.col(0).cross(ways.col(1));
+  const double sides = ways.col(0).squaredNorm() * ways.col(1).squaredNorm();
+  if (!(normal.squaredNorm() > kOnALine * kOnALine * sides)) return Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d axes;
+  axes.col(0) = ways.col(0).normalized();
+  axes.col(2) = normal.normalized();
+  axes.col(1) = axes.col(2).cross(axes.col(0));
+  return axes;
+}
 
 FlatPatches::FlatPatches(const Cloth& cloth, int runs)
     : cloth_(cloth), patches_(static_cast<std::size_t>(runs)) {

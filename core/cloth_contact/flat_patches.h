@@ -12,6 +12,9 @@
 
 namespace weft {
 
+// At right angles to each other; the first two lie in a plane that goes both ways.
+Eigen::Matrix3d axes_of(const Eigen::Matrix<double, 3, 2>& ways);
+
 // Tells where cloth lies so flat that it cannot be near itself. Let x(u) be the sheet over its flat
 // shape as seen along a line, and H convex there and without border inside. If the gradients of all
 // triangles over H differ from one matrix F by less than e, then |x(u) - x(v)| >= (s - e) |u - v|

@@ -3,6 +3,16 @@
 #include <algorithm>
 
 namespace weft {
+namespace {
+
+SmallBox small_box(const Eigen::Array4f& low, const Eigen::Array4f& high) {
+  SmallBox box;
+  Eigen::Array4f::MapAligned(box.side.data()) = low;
+  Eigen::Array4f::MapAligned(box.side.data() + 4) = -high;
+  return box;
+}
+
+}  // namespace
 
 NearBlocks::NearBlocks(const Cloth& cloth)
     : cloth_(cloth),
@@ -11,7 +21,8 @@ NearBlocks::NearBlocks(const Cloth& cloth)
       is_boxed_(box_.size()),
       has_boxes_(box_.size()),
       triangle_box_(cloth.triangles.size()),
-      edge_box_(cloth.edges.size()) {
+      edge_box_(cloth.edges.size()),
+      corner_box_(cloth.corners.size()) {
   nodes_.resize(4 * box_.size());
   number_.resize(box_.size());
   number_node(root());
@@ -115,90 +126,63 @@ void NearBlocks::box_parts(int block) {
     for (std::size_t t = first; t < last; ++t) {
       const auto& [i, j, k] = cloth_.triangles[t];
       const Eigen::Array4f p = place(i), q = place(j), r = place(k);
-      triangle_box_[t] = {p.min(q).min(r), p.max(q).max(r)};
+      triangle_box_[t] = small_box(p.min(q).min(r), p.max(q).max(r));
     }
     for (int e = cloth_.first_edge[first]; e < cloth_.first_edge[last]; ++e) {
       const auto& [i, j] = cloth_.edges[static_cast<std::size_t>(e)];
       const Eigen::Array4f p = place(i), q = place(j);
-      edge_box_[static_cast<std::size_t>(e)] = {p.min(q), p.max(q)};
+      edge_box_[static_cast<std::size_t>(e)] = small_box(p.min(q), p.max(q));
+    }
+    for (int c = cloth_.first_corner[first]; c < cloth_.first_corner[last]; ++c) {
+      const Eigen::Array4f p = place(cloth_.corners[static_cast<std::size_t>(c)]);
+      corner_box_[static_cast<std::size_t>(c)] = small_box(p, p);
     }
   });
 }
 
+float NearBlocks::reach_of_boxes(double reach) const {
+  return static_cast<float>(std::max(reach + rounding_, 0.0));
+}
+
 // Of first ... last - 1 those near a block.
-template <class BoxOf>
-void NearBlocks::choose(int first, int last, const BoxOf& box_of, int near, double reach,
-                        SmallBoxes& chosen) {
+void NearBlocks::choose(const std::vector<SmallBox>& boxes, int first, int last, int near,
+                        double reach, SmallBoxes& chosen) {
   const Box& box = block_box(near);
-  SmallBox there = {Eigen::Array4f::Zero(), Eigen::Array4f::Zero()};
-  there.low.head<3>() = box.min().array().cast<float>();
-  there.high.head<3>() = box.max().array().cast<float>();
-  const auto most = static_cast<float>(reach + rounding_);
-  const auto count = static_cast<std::size_t>(last - first);
-  chosen.number.resize(count);
-  chosen.box.resize(count);
-  std::size_t n = 0;
-  for (int k = first; k < last; ++k) {
-    const SmallBox& own = box_of(k);
-    chosen.number[n] = k;
-    chosen.box[n] = own;
-    n += (there.low - own.high).max(own.low - there.high).maxCoeff() <= most ? 1 : 0;
-  }
-  chosen.number.resize(n);
-  chosen.box.resize(n);
+  Eigen::Array4f low = Eigen::Array4f::Zero(), high = low;
+  low.head<3>() = box.min().array().cast<float>();
+  high.head<3>() = box.max().array().cast<float>();
+  chosen.choose(std::span(boxes).subspan(static_cast<std::size_t>(first),
+                                         static_cast<std::size_t>(last - first)),
+                first, small_box(low, high), reach_of_boxes(reach));
 }
 
 void NearBlocks::choose_triangles(int block, int near, double reach, SmallBoxes& chosen) {
   const auto b = static_cast<std::size_t>(block);
   box_parts(block);
-  choose(
-      cloth_.first_block[b], cloth_.first_block[b + 1],
-      [&](int t) -> const SmallBox& { return triangle_box_[static_cast<std::size_t>(t)]; }, near,
-      reach, chosen);
+  choose(triangle_box_, cloth_.first_block[b], cloth_.first_block[b + 1], near, reach, chosen);
 }
 
 void NearBlocks::choose_edges(int block, int near, double reach, SmallBoxes& chosen) {
   const auto b = static_cast<std::size_t>(block);
   box_parts(block);
-  choose(
-      cloth_.first_edge[static_cast<std::size_t>(cloth_.first_block[b])],
-      cloth_.first_edge[static_cast<std::size_t>(cloth_.first_block[b + 1])],
-      [&](int e) -> const SmallBox& { return edge_box_[static_cast<std::size_t>(e)]; }, near, reach,
-      chosen);
+  choose(edge_box_, cloth_.first_edge[static_cast<std::size_t>(cloth_.first_block[b])],
+         cloth_.first_edge[static_cast<std::size_t>(cloth_.first_block[b + 1])], near, reach,
+         chosen);
 }
 
 void NearBlocks::choose_corners(int block, int near, double reach, SmallBoxes& chosen) {
   const auto b = static_cast<std::size_t>(block);
-  const auto particle = [&](int k) { return cloth_.corners[static_cast<std::size_t>(k)]; };
-  choose(
-      cloth_.first_corner[static_cast<std::size_t>(cloth_.first_block[b])],
-      cloth_.first_corner[static_cast<std::size_t>(cloth_.first_block[b + 1])],
-      [&](int k) -> SmallBox {
-        const Eigen::Array4f at = place(particle(k));
-        return {at, at};
-      },
-      near, reach, chosen);
-  for (int& k : chosen.number) k = particle(k);
+  box_parts(block);
+  choose(corner_box_, cloth_.first_corner[static_cast<std::size_t>(cloth_.first_block[b])],
+         cloth_.first_corner[static_cast<std::size_t>(cloth_.first_block[b + 1])], near, reach,
+         chosen);
+  for (int& k : chosen.numbers()) k = cloth_.corners[static_cast<std::size_t>(k)];
 }
 
 // Of those chosen and others all that are near each other.
 std::span<const ClothPair> NearBlocks::meet_chosen(double reach, bool ascending,
                                                    Search& search) const {
-  auto& [chosen, others, met] = search;
-  const auto most = static_cast<float>(reach + rounding_);
-  const std::size_t count = chosen.box.size() * others.box.size();
-  if (met.size() < count) met.resize(count);
-  std::size_t n = 0;
-  for (std::size_t k = 0; k < chosen.box.size(); ++k) {
-    const SmallBox own = chosen.box[k];
-    const int number = chosen.number[k];
-    for (std::size_t l = ascending ? k + 1 : 0; l < others.box.size(); ++l) {
-      const SmallBox& there = others.box[l];
-      met[n] = {number, others.number[l]};
-      n += (there.low - own.high).max(own.low - there.high).maxCoeff() <= most ? 1 : 0;
-    }
-  }
-  return std::span(met).first(n);
+  return search.chosen_.meet(search.others_, ascending, reach_of_boxes(reach), search.met_);
 }
 
 std::span<const ClothPair> NearBlocks::near_triangles(const BlockPair& blocks, double reach,

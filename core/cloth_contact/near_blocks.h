@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/cloth_contact/flat_patches.h"
+#include "core/cloth_contact/small_boxes.h"
 #include "core/motion/thread_pool.h"
 
 namespace weft {
@@ -20,12 +21,6 @@ using Places = Eigen::Matrix4Xf;
 struct BlockPair {
   int one = 0, other = 0;
   auto operator<=>(const BlockPair&) const = default;
-};
-
-// Numbers of a particle and a triangle, or of two edges, or of two triangles.
-struct ClothPair {
-  int first = 0, second = 0;
-  auto operator<=>(const ClothPair&) const = default;
 };
 
 // Finds what is near by boxes around blocks of triangles, and around blocks of blocks.
@@ -88,6 +83,12 @@ class NearBlocks {
   std::span<const ClothPair> near_triangles(const BlockPair& blocks, double reach, Search& search);
   std::span<const ClothPair> near_edges(const BlockPair& blocks, double reach, Search& search);
   std::span<const ClothPair> near_corners(int one, int other, double reach, Search& search);
+  // Of a particle.
+  Eigen::Array4f place(int particle) const {
+    return Eigen::Array4f::MapAligned(about_.data() + 4 * std::ptrdiff_t{particle});
+  }
+  // Of the gap between two places, m.
+  double rounding() const { return rounding_; }
   // Of a block.
   std::span<const int> particles(int block) const {
     const auto b = static_cast<std::size_t>(block);
@@ -101,21 +102,10 @@ class NearBlocks {
   static double gap(const Box& one, const Box& other) {
     return (one.min() - other.max()).cwiseMax(other.min() - one.max()).maxCoeff();
   }
-  // Rounded to single precision; fourth components are 0.
-  struct SmallBox {
-    Eigen::Array4f low, high;
-  };
-  struct SmallBoxes {
-    std::vector<int> number;  // of what is in each
-    std::vector<SmallBox> box;
-  };
   const Box& block_box(int block);
   Box& box(const Node& node) { return nodes_[static_cast<std::size_t>(node.number)]; }
   void box_node(const Node& node);
   void box_parts(int block);
-  Eigen::Array4f place(int particle) const {
-    return Eigen::Array4f::MapAligned(about_.data() + 4 * std::ptrdiff_t{particle});
-  }
   template <class IsFar, class Near>
   void share_out_within(const Node& node, const IsFar& is_far, const Near& near) {
     if (node.count() == 1) return near(BlockPair{node.first, node.first});
@@ -135,11 +125,12 @@ class NearBlocks {
                         is_far, near);
   }
   void number_node(const Node& node);
-  template <class BoxOf>
-  void choose(int first, int last, const BoxOf& box_of, int near, double reach, SmallBoxes& chosen);
+  void choose(const std::vector<SmallBox>& boxes, int first, int last, int near, double reach,
+              SmallBoxes& chosen);
   void choose_triangles(int block, int near, double reach, SmallBoxes& chosen);
   void choose_edges(int block, int near, double reach, SmallBoxes& chosen);
   void choose_corners(int block, int near, double reach, SmallBoxes& chosen);
+  float reach_of_boxes(double reach) const;
   std::span<const ClothPair> meet_chosen(double reach, bool ascending, Search& search) const;
 
   const Cloth& cloth_;
@@ -155,7 +146,7 @@ class NearBlocks {
   const Matrix3Xd* x_ = nullptr;
   Places about_;         // the same
   double rounding_ = 0;  // of the gap between small boxes, m
-  std::vector<SmallBox> triangle_box_, edge_box_;
+  std::vector<SmallBox> triangle_box_, edge_box_, corner_box_;
 };
 
 class NearBlocks::Search {

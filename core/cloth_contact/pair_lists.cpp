@@ -8,6 +8,9 @@
 namespace weft {
 namespace {
 
+// Of a gap's rounding: of what places moved by beside a rotation.
+constexpr double kOfRounding = 8;
+
 template <class T>
 std::span<T> part_of(std::vector<T>& all, std::int64_t begin, std::int64_t end) {
   return std::span(all).subspan(static_cast<std::size_t>(begin),
@@ -15,27 +18,38 @@ std::span<T> part_of(std::vector<T>& all, std::int64_t begin, std::int64_t end) 
 }
 
 // Numbers of three points that are far from each other and from a line.
-std::array<Eigen::Index, 3> far_corners(const Matrix3Xd& at) {
+std::array<Eigen::Index, 3> far_corners(const Places& at) {
   const auto farthest = [&](const auto& squared) {
     Eigen::Index number = 0;
-    double most = -1;
+    float most = -1;
     for (Eigen::Index k = 0; k < at.cols(); ++k)
-      if (const double far = squared(at.col(k)); far > most) {
+      if (const float far = squared(at.col(k)); far > most) {
         most = far;
         number = k;
       }
     return number;
   };
-  const Vector3d middle = at.rowwise().mean();
-  const Eigen::Index one = farthest([&](const Vector3d& x) { return (x - middle).squaredNorm(); });
-  const Vector3d from = at.col(one);
-  const Eigen::Index other = farthest([&](const Vector3d& x) { return (x - from).squaredNorm(); });
-  const Vector3d along = (at.col(other) - from).normalized();
-  const Eigen::Index out = farthest([&](const Vector3d& x) {
-    const Vector3d way = x - from;
+  const Eigen::Vector4f middle = at.rowwise().mean();
+  const Eigen::Index one =
+      farthest([&](const Eigen::Vector4f& x) { return (x - middle).squaredNorm(); });
+  const Eigen::Vector4f from = at.col(one);
+  const Eigen::Index other =
+      farthest([&](const Eigen::Vector4f& x) { return (x - from).squaredNorm(); });
+  const Eigen::Vector4f along = (at.col(other) - from).normalized();
+  const Eigen::Index out = farthest([&](const Eigen::Vector4f& x) {
+    const Eigen::Vector4f way = x - from;
     return (way - along.dot(way) * along).squaredNorm();
   });
   return {one, other, out};
+}
+
+// Axes that turn with these corners.
+Eigen::Matrix3d axes_through(const Places& at, const std::array<Eigen::Index, 3>& corners) {
+  Eigen::Matrix<double, 3, 2> ways;
+  for (const std::size_t k : {0U, 1U})
+    ways.col(static_cast<Eigen::Index>(k)) =
+        (at.col(corners[k + 1]) - at.col(corners[0])).head<3>().cast<double>();
+  return axes_of(ways);
 }
 
 }  // namespace
@@ -61,6 +75,8 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& 
   ++updates_;
   in_window_.set(from, now, pool);
   blocks_.set(from, pool);
+  const int all = blocks_.root().number;
+  const double most_comes = came(all, all), enough = most_comes + spare(most_comes);
   std::vector<std::size_t> closer;  // of apart_
   if (before_.cols() > 0) {
     since_.set(before_, from, pool);
@@ -69,6 +85,7 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& 
       for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
         auto& [one, other, left] = apart_[k];
         left -= since_.between(one.number, other.number);
+        if (left >= enough) continue;
         const double comes = came(one.number, other.number);
         if (!(left >= comes + spare(comes))) found.push_back(k);
       }
@@ -86,6 +103,7 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& 
         state.left -= by;
         state.near_left -= by;
       }
+      if (state.left >= enough && !state.has_some) continue;
       state.came = came(one, other);
       if (is_due(state)) found.push_back(k);
     }
@@ -119,7 +137,8 @@ void PairLists::find_room() {
     room_ = may_miss ? Room::Constant(-1) : Room(room_.min(left - times * comes));
   };
   for (const State& state : states_)
-    include(state.has_some ? state.near_left : state.left, state.came);
+    include(state.has_some ? state.near_left : state.left,
+            came(number(state.blocks.one), number(state.blocks.other)));
   for (const Apart& apart : apart_) include(apart.left, came(apart.one.number, apart.other.number));
 }
 
@@ -213,44 +232,32 @@ double PairLists::came(int one, int other) const {
   return by < most ? by : most;
 }
 
-// Positions of the particles of both blocks, or of the one.
-void PairLists::place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const {
+// Places of the particles of both blocks, or of the one.
+void PairLists::place(const BlockPair& blocks, Places& at) const {
   const std::span<const int> one = blocks_.particles(blocks.one),
                              other = blocks.one == blocks.other ? std::span<const int>()
                                                                 : blocks_.particles(blocks.other);
-  at.resize(3, static_cast<Eigen::Index>(one.size() + other.size()));
+  at.resize(4, static_cast<Eigen::Index>(one.size() + other.size()));
   Eigen::Index n = 0;
-  for (const int i : one) at.col(n++) = x.col(i);
-  for (const int i : other) at.col(n++) = x.col(i);
+  for (const int i : one) at.col(n++) = blocks_.place(i);
+  for (const int i : other) at.col(n++) = blocks_.place(i);
 }
 
 // By how much distances within both blocks have changed since their list was made, at most, m: by
 // no more than what each particle moved by beside a rotation of all lies within.
-double PairLists::change(const Matrix3Xd& x, const BlockPair& blocks, const List& list,
-                         Matrix3Xd& now) {
-  place(x, blocks, now);
-  // any that turns with the cloth
-  const auto frame = [&](const Matrix3Xd& at) -> Eigen::Matrix3d {
-    constexpr double kOnALine = 1e-3;  // sine
-    const auto [i, j, k] = list.corners;
-    const Vector3d a = at.col(j) - at.col(i), b = at.col(k) - at.col(i), out = a.cross(b);
-    if (!(out.norm() > kOnALine * a.norm() * b.norm())) return Eigen::Matrix3d::Identity();
-    Eigen::Matrix3d axes;
-    axes.col(0) = a.normalized();
-    axes.col(2) = out.normalized();
-    axes.col(1) = axes.col(2).cross(axes.col(0));
-    return axes;
-  };
-  const Eigen::Matrix3d turn = frame(now) * frame(list.made_at).transpose();
-  Eigen::Array3d low = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()),
+double PairLists::change(const BlockPair& blocks, const List& list, Places& now) const {
+  place(blocks, now);
+  Eigen::Matrix4f turn = Eigen::Matrix4f::Zero();
+  turn.topLeftCorner<3, 3>() =
+      (axes_through(now, list.corners) * list.axes.transpose()).cast<float>();
+  Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity()),
                  high = -low;
   for (Eigen::Index k = 0; k < now.cols(); ++k) {
-    const Eigen::Array3d by = (now.col(k) - turn * list.made_at.col(k)).array();
+    const Eigen::Array4f by = (now.col(k) - turn * list.made_at.col(k)).array();
     low = low.min(by);
     high = high.max(by);
   }
-  constexpr double kRounding = 1e-9;  // of a rotation that is none but for rounding
-  const double changed = (high - low).matrix().norm() + kRounding;
+  const double changed = double{(high - low).matrix().norm()} + kOfRounding * blocks_.rounding();
   return changed < list.reach ? changed : list.reach;
 }
 
@@ -282,7 +289,7 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
 
 void PairLists::renew(const Matrix3Xd& x, double least, double reach, Scratch& scratch,
                       State& state, List& list) {
-  if (list.reach > 0) state.left = list.reach - change(x, state.blocks, list, scratch.now);
+  if (list.reach > 0) state.left = list.reach - change(state.blocks, list, scratch.now);
   if (state.left >= least) return;
   constexpr int kMostBent = 7;
   constexpr double kBeyondJoined = 0.3, kBeyond = 1.4;
@@ -304,9 +311,11 @@ void PairLists::renew(const Matrix3Xd& x, double least, double reach, Scratch& s
       reach + (blocks_.are_joined(state.blocks) ? kBeyondJoined : kBeyond) * cloth_.thickest;
   list.all = candidates_of(
       cloth_, find_pairs(cloth_, blocks_, state.blocks, x, reach, list.reach, scratch.search));
+  list.reach -= kOfRounding * blocks_.rounding();
   state.left = list.reach;
-  place(x, state.blocks, list.made_at);
-  list.corners = far_corners(list.made_at);
+  place(state.blocks, list.made_at);
+  if (list.corners[0] == list.corners[1]) list.corners = far_corners(list.made_at);
+  list.axes = axes_through(list.made_at, list.corners);
   state.has_some = !list.all.empty();
 }
 

@@ -50,14 +50,15 @@ class PairLists {
   struct State {
     BlockPair blocks;
     double left = -1, near_left = -1;  // of the reach of all, and of what is near, m
-    double came = 0;                   // in the window, m
+    double came = 0;                   // in the window, where it was looked at closer, m
     bool has_some = false, is_near = false;
     int bent = 0, bent_for = 0;  // how often it is not asked whether they lie flat
   };
   struct List {
     double reach = 0;                          // when it was made, m; 0: it was not
-    Matrix3Xd made_at = {};                    // of the particles of both blocks, m
-    std::array<Eigen::Index, 3> corners = {};  // of these, far from each other
+    Places made_at = {};                       // of the particles of both blocks
+    std::array<Eigen::Index, 3> corners = {};  // of these, far from each other when first made
+    Eigen::Matrix3d axes = {};                 // that turn with these
     Candidates all = {}, near = {};
   };
   // Nodes of blocks that are so far apart, or lie so flat together, that no two of their blocks
@@ -69,7 +70,7 @@ class PairLists {
   // What looking closer uses, of each share of it.
   struct Scratch {
     NearBlocks::Search search;
-    Matrix3Xd now;
+    Places now;
   };
 
   double came(int one, int other) const;  // no more than kMostMotion
@@ -79,8 +80,8 @@ class PairLists {
   double least_left(double come) const;
   void find_room();
   int number(int block) const { return blocks_.number(block); }
-  void place(const Matrix3Xd& x, const BlockPair& blocks, Matrix3Xd& at) const;
-  double change(const Matrix3Xd& x, const BlockPair& blocks, const List& list, Matrix3Xd& now);
+  void place(const BlockPair& blocks, Places& at) const;
+  double change(const BlockPair& blocks, const List& list, Places& now) const;
   bool is_due(const State& state) const;
   void look_closer(const Matrix3Xd& x, Scratch& scratch, State& state, List& list);
   void renew(const Matrix3Xd& x, double least, double reach, Scratch& scratch, State& state,

@@ -97,11 +97,12 @@ Scene landing_scene() {
   return scene;
 }
 
-// A swatch that falls onto another as fast as windows of contact are shortened for.
+// A swatch that falls onto another as fast as windows of contact are shortened for, of several
+// blocks each.
 Scene fallen_scene() {
   Scene scene;
   for (const double height : {0.0, 3.5e-3}) {
-    SheetDefinition& sheet = scene.sheets.emplace_back(rough_sheet(Grid{3, 5, 0.01}, Isometric{}));
+    SheetDefinition& sheet = scene.sheets.emplace_back(rough_sheet(Grid{7, 9, 0.01}, Isometric{}));
     sheet.pins.clear();
     for (std::size_t i = 1; i < sheet.start_positions.size(); i += 3) {
       sheet.start_positions[i] += height;

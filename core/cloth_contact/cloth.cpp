@@ -7,12 +7,12 @@
 namespace weft {
 namespace {
 
-constexpr int kBlockTriangles = 32;  // at most
+constexpr std::size_t kBlockTriangles = 36;  // about as many in each
 
-// Halves triangles across the longer side until they are few enough for a block.
-void divide_block(std::span<int> triangles, const std::vector<Vector3d>& centers,
-                  std::vector<std::size_t>& sizes) {
-  if (triangles.size() <= kBlockTriangles) {
+// Divides triangles across the longer side, again and again, into blocks of nearly as many.
+void divide(std::span<int> triangles, std::size_t blocks, const std::vector<Vector3d>& centers,
+            std::vector<std::size_t>& sizes) {
+  if (blocks <= 1) {
     sizes.push_back(triangles.size());
     return;
   }
@@ -23,14 +23,14 @@ void divide_block(std::span<int> triangles, const std::vector<Vector3d>& centers
   for (const int t : triangles) box.extend(center(t));
   Eigen::Index axis = 0;
   box.sizes().maxCoeff(&axis);
-  const auto half = triangles.size() / 2;
+  const std::size_t few = blocks / 2, half = triangles.size() * few / blocks;
   std::nth_element(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(half),
                    triangles.end(), [&](int s, int t) {
                      const double a = center(s)[axis], b = center(t)[axis];
                      return a < b || (a == b && s < t);
                    });
-  divide_block(triangles.first(half), centers, sizes);
-  divide_block(triangles.subspan(half), centers, sizes);
+  divide(triangles.first(half), few, centers, sizes);
+  divide(triangles.subspan(half), blocks - few, centers, sizes);
 }
 
 // How many triangles each piece has.
@@ -104,7 +104,10 @@ Cloth::Cloth(const std::vector<SheetDefinition>& sheets, const LeftOut& left_out
       const std::size_t begin = order.size();
       for (const int end = t + static_cast<int>(count); t < end; ++t)
         if (all || !left_out[s][static_cast<std::size_t>(t)]) order.push_back(t);
-      if (order.size() > begin) divide_block(std::span(order).subspan(begin), centers, sizes);
+      const std::size_t in_piece = order.size() - begin;
+      if (in_piece > 0)
+        divide(std::span(order).subspan(begin), (in_piece + kBlockTriangles / 2) / kBlockTriangles,
+               centers, sizes);
       for (const std::size_t size : sizes)
         first_block.push_back(first_block.back() + static_cast<int>(size));
       piece.resize(first_block.size() - 1, pieces++);

@@ -11,7 +11,7 @@ namespace weft::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using SideTag = hn::CappedTag<float, 8>;
-constexpr std::size_t kLanes = hn::MaxLanes(SideTag()), kParts = 8 / kLanes;
+constexpr std::size_t kLanes = hn::MaxLanes(SideTag());
 
 // What no side of a box that is near lies beyond.
 class Surroundings {

@@ -50,7 +50,7 @@ class PairLists {
   struct State {
     BlockPair blocks;
     double left = -1, near_left = -1;  // of the reach of all, and of what is near, m
-    double came = 0;                   // in the window, where it was looked at closer, m
+    double came = 0;                   // in the window, where it may be due, m
     bool has_some = false, is_near = false;
     int bent = 0, bent_for = 0;  // how often it is not asked whether they lie flat
   };

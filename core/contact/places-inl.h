@@ -291,7 +291,7 @@ struct ResolvedPlaces {
     moved = hn::Max(moved, hn::IfThenElseZero(touching, squared(by)));
     changed = hn::Max(changed, hn::IfThenElseZero(touching, squared(in_step)));
   }
-  HWY_INLINE Resolved all() const {
+  HWY_INLINE Resolved result() const {
     const ContactTag d;
     return {hn::GetLane(hn::MinOfLanes(d, gap)), std::sqrt(hn::GetLane(hn::MaxOfLanes(d, moved))),
             std::sqrt(hn::GetLane(hn::MaxOfLanes(d, changed)))};

@@ -42,7 +42,7 @@ Resolved resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool c
   const int step = static_cast<int>(hn::Lanes(ContactTag()));
   const Places from = everywhere(origin);
   const Reals far = real(std::numeric_limits<double>::infinity());
-  ResolvedPlaces all{far, real(0), real(0)};
+  ResolvedPlaces resolved{far, real(0), real(0)};
   for (int j = 0; j < state.vectors(); ++j) {
     for (int part = 0; part < kLanes; part += step) {
       T* const shared = state.shared(row) + j * State::kSharedStride + part;
@@ -65,7 +65,7 @@ Resolved resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool c
           gaps(contacts, x, known.empty() ? nullptr : &known[static_cast<std::size_t>(group)],
                static_cast<std::size_t>(part % kGroup));
       const Reals gap = hn::IfThenElse(free, found.least, far);
-      all.gap = hn::Min(all.gap, gap);
+      resolved.gap = hn::Min(resolved.gap, gap);
       const auto touching = hn::Lt(gap, real(0));
       if (hn::AllFalse(ContactTag(), touching)) continue;
 
@@ -82,7 +82,7 @@ Resolved resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool c
       };
       const Places relative = minus(x, from);
       const auto kept = [&](const Places& v) HWY_ATTR { return compensated ? v : rounded<T>(v); };
-      all.move(touching, minus(kept(relative), place), minus(kept(d), before));
+      resolved.move(touching, minus(kept(relative), place), minus(kept(d), before));
       set(State::kX, State::kXError, relative.x);
       set(State::kX + 1, State::kXError + 1, relative.y);
       set(State::kX + 2, State::kXError + 2, relative.z);
@@ -95,7 +95,7 @@ Resolved resolve_row_as(const Contacts& contacts, const Vector3d& origin, bool c
       store(State::kW + 2, hn::Add(Of::load(at(State::kW + 2)), rounded<T>(change.z)));
     }
   }
-  return all.all();
+  return resolved.result();
 }
 
 Resolved resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int row,

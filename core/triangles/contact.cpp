@@ -48,7 +48,7 @@ Resolved resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool c
   constexpr std::size_t kValues = 4;
   static_assert(kContactRun % Lanes::kMost == 0);
   const std::size_t begin = static_cast<std::size_t>(run) * kContactRun * kValues;
-  ResolvedPlaces all{far, real(0), real(0)};
+  ResolvedPlaces resolved{far, real(0), real(0)};
   for (std::size_t first = begin; first < begin + kContactRun * kValues;
        first += kValues * Lanes::kMost) {
     const auto exact = [&](const AlignedArray<T>& plane, const AlignedArray<T>& error) HWY_ATTR {
@@ -59,7 +59,7 @@ Resolved resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool c
     Places x = plus(everywhere(origin), exact(state.x, state.x_error));
     const Gaps found = gaps(contacts, x, cells, (first - begin) / kValues);
     const Reals gap = hn::IfThenElse(free, found.least, far);
-    all.gap = hn::Min(all.gap, gap);
+    resolved.gap = hn::Min(resolved.gap, gap);
     const auto touching = hn::Lt(gap, real(0));
     if (hn::AllFalse(d, touching)) continue;
 
@@ -68,7 +68,8 @@ Resolved resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool c
     resolve_places(contacts, touching, found.first, x, moved);
     const auto kept = [&](const Places& v) HWY_ATTR { return compensated ? v : rounded<T>(v); };
     const Places from = everywhere(origin);
-    all.move(touching, minus(kept(minus(x, from)), minus(at, from)), minus(kept(moved), before));
+    resolved.move(touching, minus(kept(minus(x, from)), minus(at, from)),
+                  minus(kept(moved), before));
 
     HWY_ALIGN double touched[Lanes::kMost];
     hn::Store(hn::IfThenElseZero(touching, real(1)), d, touched);
@@ -90,7 +91,7 @@ Resolved resolve_run_as(const Contacts& contacts, const Vector3d& origin, bool c
       }
     }
   }
-  return all.all();
+  return resolved.result();
 }
 
 Resolved resolve_single(const Contacts& contacts, const Vector3d& origin, bool compensated, int run,

@@ -85,7 +85,7 @@ Eigen::Matrix3d axes_of(const Eigen::Matrix<double, 3, 2>& ways) {
 }
 
 FlatPatches::FlatPatches(const Cloth& cloth, int runs)
-    : cloth_(cloth), patches_(static_cast<std::size_t>(runs)) {
+    : cloth_(cloth), patches_(static_cast<std::size_t>(runs)), gradients_(cloth) {
   const std::size_t blocks = cloth.first_block.size() - 1;
   std::vector<Vector2d> corners;
   // by piece, particles and place: how often
@@ -98,11 +98,6 @@ FlatPatches::FlatPatches(const Cloth& cloth, int runs)
       const auto& flat = cloth.flat[at];
       Eigen::Matrix2d edges;
       edges << flat[1] - flat[0], flat[2] - flat[0];
-      const Eigen::Matrix2f inverse = edges.inverse().cast<float>();
-      const auto row = [&](Eigen::Index k) -> Eigen::Array4f {
-        return {inverse(k, 0), inverse(k, 0), inverse(k, 1), inverse(k, 1)};
-      };
-      inverse_.push_back({row(0), row(1)});
       const double longest =
           std::max({edges.col(0).norm(), edges.col(1).norm(), (flat[2] - flat[1]).norm()});
       least = std::min(least, std::abs(edges.determinant()) / longest);
@@ -124,8 +119,7 @@ FlatPatches::FlatPatches(const Cloth& cloth, int runs)
   }
   for (const auto& [ends, side] : sides)
     if (side.first != 2) borders_.push_back(side.second);
-  gradients_.resize(blocks);
-  are_made_ = std::vector<MadeOnce>(blocks);
+  are_set_ = std::vector<MadeOnce>(blocks);
 }
 
 void FlatPatches::set(const Eigen::Matrix4Xf& places, double farthest) {
@@ -146,40 +140,18 @@ double FlatPatches::distance(const Blocks& some, const Blocks& others) {
 }
 
 double FlatPatches::distance(const Patch& over) {
-  Gradient sum = Gradient::Zero();
-  for (const int block : over.blocks) sum += gradients(block).sum;
-  // seen along its mean normal
-  const Gradient seen = axes_of(sum).leftCols<2>();
-  Rows ways;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto axis = static_cast<Eigen::Index>(k);
-    const auto a = static_cast<float>(seen(axis, 0)), b = static_cast<float>(seen(axis, 1));
-    ways[k] = {a, b, a, b};
-  }
-  Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity()),
-                 high = -low;
-  constexpr std::size_t kFew = 8;  // blocks, of which each triangle is looked at
+  Eigen::Matrix<float, 3, 2> sum = Eigen::Matrix<float, 3, 2>::Zero();
   for (const int block : over.blocks) {
-    const Gradients& own = gradients(block);
-    if (over.blocks.size() <= kFew) {
-      for (const Rows& each : own.each) {
-        const Eigen::Array4f plane = ways[0] * each[0] + ways[1] * each[1] + ways[2] * each[2];
-        low = low.min(plane);
-        high = high.max(plane);
-      }
-      continue;
-    }
-    const Gradient along = own.axes.transpose() * seen;
-    const Eigen::Matrix2d middle = along.transpose() * own.middle,
-                          half = along.cwiseAbs().transpose() * own.half;
-    low = low.min((middle - half).reshaped().array().cast<float>());
-    high = high.max((middle + half).reshaped().array().cast<float>());
+    const auto b = static_cast<std::size_t>(block);
+    are_set_[b].in(now_, [&] { gradients_.set(block, *places_); });
+    sum += gradients_.sum(block);
   }
-  const Eigen::Array4d middle = (low + high).cast<double>() / 2;
+  // seen along its mean normal
+  const auto [low, high] =
+      gradients_.along(axes_of(sum.cast<double>()).leftCols<2>().cast<float>(), over.blocks);
+  const Eigen::Matrix2d plane = (low + high).cast<double>().matrix() / 2,
+                        square = plane.transpose() * plane;
   const double differs = (high - low).cast<double>().matrix().norm() / 2;
-  Eigen::Matrix2d plane;
-  plane << middle[0], middle[2], middle[1], middle[3];
-  const Eigen::Matrix2d square = plane.transpose() * plane;
   const double least =
       square.trace() / 2 - std::hypot((square(0, 0) - square(1, 1)) / 2, square(0, 1));
   // of gradients, and of places
@@ -231,66 +203,6 @@ void FlatPatches::make(const Blocks& some, const Blocks& others, Patch& patch) c
     patch.blocks.push_back(static_cast<int>(c));
     patch.least_height = std::min(patch.least_height, least_height_[c]);
   }
-}
-
-const FlatPatches::Gradients& FlatPatches::gradients(int block) {
-  const auto b = static_cast<std::size_t>(block);
-  are_made_[b].in(now_, [&] { make(block, gradients_[b]); });
-  return gradients_[b];
-}
-
-void FlatPatches::make(int block, Gradients& gradients) const {
-  const auto b = static_cast<std::size_t>(block);
-  gradients.each.clear();
-  const float* places = places_->data();
-  const auto place = [&](int i) -> Eigen::Array4f {
-    return Eigen::Array4f::MapAligned(places + 4 * std::ptrdiff_t{i});
-  };
-  Rows sum;
-  sum.fill(Eigen::Array4f::Zero());
-  for (int t = cloth_.first_block[b]; t < cloth_.first_block[b + 1]; ++t) {
-    const auto at = static_cast<std::size_t>(t);
-    const auto& [i, j, k] = cloth_.triangles[at];
-    const Eigen::Array4f from = place(i), one = place(j) - from, other = place(k) - from;
-    Rows& rows = gradients.each.emplace_back();
-    for (std::size_t row = 0; row < 3; ++row) {
-      const auto axis = static_cast<Eigen::Index>(row);
-      rows[row] = one[axis] * inverse_[at][0] + other[axis] * inverse_[at][1];
-      sum[row] += rows[row];
-    }
-  }
-  for (std::size_t row = 0; row < 3; ++row) {
-    const auto axis = static_cast<Eigen::Index>(row);
-    gradients.sum(axis, 0) = double{sum[row][0]};
-    gradients.sum(axis, 1) = double{sum[row][2]};
-  }
-  gradients.axes = axes_of(gradients.sum);
-  // along the first two axes, and the third
-  Rows ways, out;
-  for (std::size_t row = 0; row < 3; ++row) {
-    const Eigen::Array3f along =
-        gradients.axes.row(static_cast<Eigen::Index>(row)).transpose().array().cast<float>();
-    ways[row] = {along[0], along[1], along[0], along[1]};
-    out[row] = Eigen::Array4f::Constant(along[2]);
-  }
-  Eigen::Array4f low = Eigen::Array4f::Constant(std::numeric_limits<float>::infinity()),
-                 high = -low, low_out = low, high_out = high;
-  for (const Rows& each : gradients.each) {
-    const Eigen::Array4f in = ways[0] * each[0] + ways[1] * each[1] + ways[2] * each[2],
-                         beside = out[0] * each[0] + out[1] * each[1] + out[2] * each[2];
-    low = low.min(in);
-    high = high.max(in);
-    low_out = low_out.min(beside);
-    high_out = high_out.max(beside);
-  }
-  const auto gradient = [](const Eigen::Array4f& in, const Eigen::Array4f& beside) {
-    Gradient made;
-    made << double{in[0]}, double{in[2]}, double{in[1]}, double{in[3]}, double{beside[0]},
-        double{beside[2]};
-    return made;
-  };
-  gradients.middle = gradient((low + high) / 2, (low_out + high_out) / 2);
-  gradients.half = gradient((high - low) / 2, (high_out - low_out) / 2);
 }
 
 }  // namespace weft

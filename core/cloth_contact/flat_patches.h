@@ -1,13 +1,13 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <mutex>
 #include <vector>
 
 #include "core/cloth_contact/cloth.h"
+#include "core/cloth_contact/gradients.h"
 #include "core/cloth_contact/made_once.h"
 
 namespace weft {
@@ -38,16 +38,6 @@ class FlatPatches {
   double distance(const Blocks& some, const Blocks& others);
 
  private:
-  using Gradient = Eigen::Matrix<double, 3, 2>;
-  // Rows of a gradient (u, v): (u, u, v, v), in single precision.
-  using Rows = std::array<Eigen::Array4f, 3>;
-  // Of the triangles of a block: they lie in a box along axes that lie in the block.
-  struct Gradients {
-    std::vector<Rows> each;
-    Gradient sum;
-    Eigen::Matrix3d axes;
-    Gradient middle, half;  // along these
-  };
   using Box = Eigen::AlignedBox2d;
   using Polygon = std::vector<Vector2d>;  // convex, anticlockwise
   struct Patch {
@@ -71,12 +61,8 @@ class FlatPatches {
   Patch& patch(const Blocks& some, const Blocks& others);
   void make(const Blocks& some, const Blocks& others, Patch& patch) const;
   double distance(const Patch& over);
-  const Gradients& gradients(int block);
-  void make(int block, Gradients& gradients) const;
 
   const Cloth& cloth_;
-  // of each triangle's sides in the flat shape, as rows of a gradient, 1/m
-  std::vector<std::array<Eigen::Array4f, 2>> inverse_;
   std::vector<Polygon> hull_;         // of each block
   std::vector<Box> box_;              // around these
   std::vector<double> least_height_;  // of each block, m
@@ -85,10 +71,10 @@ class FlatPatches {
   std::vector<std::vector<Known>> patches_;  // of each run, ascending
 
   const Eigen::Matrix4Xf* places_ = nullptr;
-  double farthest_ = 0;               // m
-  std::int64_t now_ = 0;              // counts what was set
-  std::vector<Gradients> gradients_;  // of each block
-  std::vector<MadeOnce> are_made_;    // these, of places
+  double farthest_ = 0;   // m
+  std::int64_t now_ = 0;  // counts what was set
+  Gradients gradients_;
+  std::vector<MadeOnce> are_set_;  // of each block, at places
 };
 
 }  // namespace weft

@@ -119,10 +119,9 @@ class TriangleSolver : public SheetSolver {
   double take_change() override { return motion_.take_change(); }
   void read(std::span<const int> particles, Eigen::Ref<Matrix3Xd> x,
             Eigen::Ref<Matrix3Xd> d) const override {
-    for (Eigen::Index k = 0; const int i : particles) {
-      x.col(k) = position_at(place(i));
-      d.col(k++) = exact(state_.d, state_.d_error, place(i));
-    }
+    read(particles, state_.x, state_.x_error, x);
+    x.colwise() += origin_;
+    read(particles, state_.d, state_.d_error, d);
   }
   void displace(std::span<const int> particles, const Eigen::Ref<const Matrix3Xd>& by,
                 const Eigen::Ref<const Matrix3Xd>& in_step) override {
@@ -263,6 +262,21 @@ class TriangleSolver : public SheetSolver {
     Eigen::Array4d v = Four::Map(plane.data() + at).template cast<double>();
     if (law_.compensated) v -= Four::Map(error.data() + at).template cast<double>();
     return v.head<3>();
+  }
+  void read(std::span<const int> particles, const AlignedArray<T>& plane,
+            const AlignedArray<T>& error, Eigen::Ref<Matrix3Xd> to) const {
+    using Four = Eigen::Array<T, 4, 1>;
+    const T *values = plane.data(), *errors = law_.compensated ? error.data() : nullptr;
+    const int* places = law_.place.data();
+    double* out = to.data();
+    const std::ptrdiff_t stride = to.outerStride();
+    for (const int i : particles) {
+      const std::ptrdiff_t at = std::ptrdiff_t{4} * places[i];
+      Eigen::Array4d v = Four::Map(values + at).template cast<double>();
+      if (errors != nullptr) v -= Four::Map(errors + at).template cast<double>();
+      Eigen::Map<Vector3d>{out} = v.template head<3>();
+      out += stride;
+    }
   }
   Vector3d position_at(std::size_t at) const {
     return origin_ + exact(state_.x, state_.x_error, at);

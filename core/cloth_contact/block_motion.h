@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -19,11 +20,14 @@ class BlockMotion {
 
   // How far what is in two nodes, or blocks, moved in relation to each other, at most, m: what both
   // moved by lies in a box around theirs.
-  double between(int one, int other) const {
+  double between(int one, int other) const { return root(squared(one, other)); }
+  // In two steps, of which the second can be taken for several at once.
+  float squared(int one, int other) const {
     const Box &a = box_[static_cast<std::size_t>(one)], &b = box_[static_cast<std::size_t>(other)];
-    const Eigen::Array4f sides = a.high.max(b.high) - a.low.min(b.low);
-    return kOfRounding * double{sides.matrix().norm()} + kRounding;
+    return (a.high.max(b.high) - a.low.min(b.low)).matrix().squaredNorm();
   }
+  static double root(float squared) { return rounded(std::sqrt(squared)); }
+  static double rounded(float root) { return kOfRounding * double{root} + kRounding; }
 
  private:
   static constexpr double kOfRounding = 1 + 1e-6, kRounding = 1e-12;

@@ -11,7 +11,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace weft::HWY_NAMESPACE {
 
-using PairTag = hn::CappedTag<double, PairBatch::kMost>;
+using PairTag = hn::CappedTag<double, 8>;
 using Values = hn::Vec<PairTag>;
 using Point = Triple<Values>;
 
@@ -175,7 +175,15 @@ HWY_EXPORT(solve_corners);
 HWY_EXPORT(solve_edges);
 HWY_EXPORT(find_farthest);
 
+// Lanes beyond the last pair look at particles, too.
+void PairBatch::fill(Particles& particles, std::size_t size) {
+  constexpr std::size_t kMostLanes = 8;
+  static_assert(kMost % kMostLanes == 0);
+  for (std::size_t k = size; k % kMostLanes != 0; ++k) particles[k] = {};
+}
+
 void PairBatch::solve() {
+  fill(particles_, size_);
   const Planes planes{x_, particles_.data(), weights_, apart_, squared_, size_};
   if (edges_)
     HWY_DYNAMIC_DISPATCH(solve_edges)(planes);
@@ -192,6 +200,7 @@ void PairBatch::find_near(std::span<const Mover> movers) {
     const bool is_near = (squared_[k] < within_[k] * within_[k]) & (squared_[k] > 0);
     near_size_ += is_near ? 1 : 0;
   }
+  fill(near_particles_, near_size_);
   HWY_DYNAMIC_DISPATCH(find_farthest)
   ({edges_, movers.data(), near_particles_.data(), squared_way_, squared_in_step_, near_size_});
 }

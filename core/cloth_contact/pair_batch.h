@@ -31,6 +31,12 @@ class PairBatch {
     particles_[size_++] = particles;
   }
 
+  // The same, or nothing; however far they are, they are near.
+  void add_if(bool wanted, const std::array<int, 4>& particles) {
+    particles_[size_] = particles;
+    size_ += wanted ? 1 : 0;
+  }
+
   // As nearest_in_triangle() and nearest_on_edges(), of all that were added.
   void solve();
   // Of a pair: weights that lead from the second one's nearest point to the first one's; the way
@@ -68,10 +74,13 @@ class PairBatch {
   };
 
  private:
+  using Particles = std::array<std::array<int, 4>, kMost>;
+  static void fill(Particles& particles, std::size_t size);
+
   bool edges_;
   const double* x_;
   std::size_t size_ = 0, near_size_ = 0;
-  std::array<std::array<int, 4>, kMost> particles_ = {}, near_particles_ = {};
+  Particles particles_, near_particles_;
   std::array<double, kMost> within_;
   std::array<std::size_t, kMost> near_;
   alignas(64) double weights_[4][kMost];

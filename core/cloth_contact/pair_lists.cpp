@@ -71,46 +71,28 @@ void PairLists::forget() {
 }
 
 void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& pool) {
-  constexpr std::int64_t kLeastShare = 1024, kLeastCloser = 8;  // of a thread
+  constexpr std::int64_t kLeastShare = 8;  // of a thread
   ++updates_;
   in_window_.set(from, now, pool);
   blocks_.set(from, pool);
-  const int all = blocks_.root().number;
-  const double most_comes = came(all, all), enough = most_comes + spare(most_comes);
   std::vector<std::size_t> closer;  // of apart_
   if (before_.cols() > 0) {
     since_.set(before_, from, pool);
-    const auto find_closer = [&](std::int64_t begin, std::int64_t end,
-                                 std::vector<std::size_t>& found) {
-      for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
-        auto& [one, other, left] = apart_[k];
-        left -= since_.between(one.number, other.number);
-        if (left >= enough) continue;
-        const double comes = came(one.number, other.number);
-        if (!(left >= comes + spare(comes))) found.push_back(k);
-      }
-    };
-    closer = find_in_shares<std::size_t>(pool, std::ssize(apart_), kLeastShare, find_closer);
+    closer = find_due(
+        std::span(apart_),
+        [&](const Apart& apart, double comes) { return !(apart.left >= comes + spare(comes)); },
+        pool);
   }
   meet(closer);
-
-  const auto find_due = [&](std::int64_t begin, std::int64_t end, std::vector<std::size_t>& found) {
-    for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
-      State& state = states_[k];
-      const int one = number(state.blocks.one), other = number(state.blocks.other);
-      if (before_.cols() > 0) {
-        const double by = since_.between(one, other);
-        state.left -= by;
-        state.near_left -= by;
-      }
-      if (state.left >= enough && !state.has_some) continue;
-      state.came = came(one, other);
-      if (is_due(state)) found.push_back(k);
-    }
-  };
-  auto due = find_in_shares<std::size_t>(pool, std::ssize(states_), kLeastShare, find_due);
+  auto due = find_due(
+      std::span(states_),
+      [&](const State& state, double comes) {
+        const double more = spare(comes);
+        return !(state.left >= comes + more / 2) | !(state.left + state.beyond >= comes + more);
+      },
+      pool);
   before_ = from;
-  const std::size_t shares = shares_of(pool, std::ssize(due), kLeastCloser);
+  const std::size_t shares = shares_of(pool, std::ssize(due), kLeastShare);
   if (scratch_.size() < shares) scratch_.resize(shares);
   run_shares(pool, shares, std::ssize(due),
              [&](std::size_t share, std::int64_t begin, std::int64_t end) {
@@ -121,11 +103,44 @@ void PairLists::update(const Matrix3Xd& from, const Matrix3Xd& now, ThreadPool& 
   lasts_ = kMostMotion * cloth_.thickest;
   near_ = 0;
   for (const State& state : states_) {
-    lasts_ = std::min(lasts_, state.has_some ? state.near_left : state.left);
-    if (state.is_near) ++near_;
+    lasts_ = std::min(lasts_, state.left);
+    near_ += state.is_near ? 1 : 0;
   }
   for (const Apart& apart : apart_) lasts_ = std::min(lasts_, apart.left);
   find_room();
+}
+
+// Lowers what is left of entries by what their nodes moved by since the last update, and finds, in
+// their order, those that are due where they come so far in the window.
+template <class Entry, class IsDue>
+std::vector<std::size_t> PairLists::find_due(std::span<Entry> entries, const IsDue& is_due,
+                                             ThreadPool& pool) {
+  constexpr std::int64_t kLeastShare = 1024, kTogether = 32;
+  using Together = Eigen::Array<float, kTogether, 1>;
+  const bool moved = before_.cols() > 0;
+  const auto find = [&](std::int64_t begin, std::int64_t end, std::vector<std::size_t>& found) {
+    for (std::int64_t first = begin; first < end; first += kTogether) {
+      const auto some = entries.subspan(static_cast<std::size_t>(first),
+                                        static_cast<std::size_t>(std::min(kTogether, end - first)));
+      Together since = Together::Zero(), comes = Together::Zero();
+      for (Eigen::Index n = 0; const Entry& entry : some) {
+        if (moved) since[n] = since_.squared(number(entry.one), number(entry.other));
+        comes[n++] = in_window_.squared(number(entry.one), number(entry.other));
+      }
+      since = since.sqrt();
+      comes = comes.sqrt();
+      // without branches, which nothing foretells
+      std::array<std::size_t, kTogether> due;
+      std::size_t count = 0;
+      for (Eigen::Index n = 0; Entry & entry : some) {
+        if (moved) entry.left -= BlockMotion::rounded(since[n]);
+        due[count] = static_cast<std::size_t>(first + n);
+        count += is_due(entry, at_most(BlockMotion::rounded(comes[n++]))) ? 1 : 0;
+      }
+      found.insert(found.end(), due.begin(), due.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+  };
+  return find_in_shares<std::size_t>(pool, std::ssize(entries), kLeastShare, find);
 }
 
 void PairLists::find_room() {
@@ -136,9 +151,7 @@ void PairLists::find_room() {
     const bool may_miss = comes >= kMostMotion * cloth_.thickest;
     room_ = may_miss ? Room::Constant(-1) : Room(room_.min(left - times * comes));
   };
-  for (const State& state : states_)
-    include(state.has_some ? state.near_left : state.left,
-            came(number(state.blocks.one), number(state.blocks.other)));
+  for (const State& state : states_) include(state.left, came(state.one, state.other));
   for (const Apart& apart : apart_) include(apart.left, came(apart.one.number, apart.other.number));
 }
 
@@ -158,23 +171,26 @@ double PairLists::spare(double come) const {
   return near_ > 0 ? 0 : std::min(kMore * come + kLeast * cloth_.thickest, kMost * cloth_.thickest);
 }
 
-bool PairLists::is_due(const State& state) const {
-  const double more = spare(state.came);
-  return !(state.left >= state.came + more) ||
-         (state.has_some && !(state.near_left >= state.came + more / 2));
-}
-
 // Some windows pass until it is looked at again. Lists of flat cloth stay empty: what shares no
 // particle there is 2.8 thicknesses apart.
 void PairLists::look_closer(const Matrix3Xd& x, Scratch& scratch, State& state, List& list) {
-  const double thickest = cloth_.thickest, comes = state.came, more = spare(comes);
-  if (!(state.left >= comes + more))
-    renew(x, least_left(comes) + more,
-          std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + more, scratch, state,
-          list);
-  if (state.has_some && !(state.near_left >= comes + more / 2))
-    prune(x, comes + (more > 0 ? more / 2 : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest)),
-          state, list);
+  const double thickest = cloth_.thickest, comes = came(state.one, state.other),
+               more = spare(comes);
+  double left = state.left + state.beyond;
+  if (!(left >= comes + more))
+    left = renew(x, left, least_left(comes) + more,
+                 std::max(1.6 * thickest, comes + std::min(7 * comes, thickest)) + more, scratch,
+                 state, list);
+  if (!list.has_some) {
+    state.left = left;
+  } else if (!(state.left >= comes + more / 2)) {
+    state.left = left;
+    const double reach =
+        more > 0 ? more / 2 : std::clamp(3 * comes, 0.05 * thickest, 0.5 * thickest);
+    nearer(list.all, x, comes + reach, list.near, state.left);
+    state.is_near = !list.near.empty();
+  }
+  state.beyond = left - state.left;
 }
 
 // Has states for all blocks that may be near. closer: of those that were apart, ascending.
@@ -227,11 +243,6 @@ double PairLists::least_left(double come) const {
   return come + std::min(2 * come, 0.5 * cloth_.thickest) + 0.1 * cloth_.thickest;
 }
 
-double PairLists::came(int one, int other) const {
-  const double most = kMostMotion * cloth_.thickest, by = in_window_.between(one, other);
-  return by < most ? by : most;
-}
-
 // Places of the particles of both blocks, or of the one.
 void PairLists::place(const BlockPair& blocks, Places& at) const {
   const std::span<const int> one = blocks_.particles(blocks.one),
@@ -270,59 +281,52 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
   std::size_t known = 0;
   const auto keep = [&] {
     states_.push_back(old_states[known]);
-    lists_.push_back(std::move(old_lists[known]));
+    lists_.push_back(std::move(old_lists[known++]));
   };
+  const auto is_known = [&] { return known < old_states.size(); };
   for (const BlockPair& blocks : met) {
-    for (; known < old_states.size() && old_states[known].blocks < blocks; ++known)
-      if (!only) keep();
-    if (known < old_states.size() && old_states[known].blocks == blocks) {
+    while (is_known() && old_lists[known]->blocks < blocks) only ? void(++known) : keep();
+    if (is_known() && old_lists[known]->blocks == blocks) {
       keep();
-      ++known;
     } else {
-      states_.push_back({blocks});
-      lists_.push_back(std::make_unique<List>());
+      states_.push_back({blocks_.number(blocks.one), blocks_.number(blocks.other)});
+      lists_.push_back(std::make_unique<List>(List{.blocks = blocks}));
     }
   }
-  if (only) return;
-  for (; known < old_states.size(); ++known) keep();
+  while (!only && is_known()) keep();
 }
 
-void PairLists::renew(const Matrix3Xd& x, double least, double reach, Scratch& scratch,
-                      State& state, List& list) {
-  if (list.reach > 0) state.left = list.reach - change(state.blocks, list, scratch.now);
-  if (state.left >= least) return;
+// How long it holds then, m; left: how long it does.
+double PairLists::renew(const Matrix3Xd& x, double left, double least, double reach,
+                        Scratch& scratch, State& state, List& list) {
+  if (list.reach > 0) left = std::max(left, list.reach - change(list.blocks, list, scratch.now));
+  if (left >= least) return left;
   constexpr int kMostBent = 7;
   constexpr double kBeyondJoined = 0.3, kBeyond = 1.4;
   list.reach = 0;
-  state.has_some = state.is_near = false;
-  state.near_left = -1;
+  list.has_some = state.is_near = false;
+  state.left = -1;
   // what is bent stays so for a while
-  if (state.bent > 0) {
-    --state.bent;
-    state.left = blocks_.gap(state.blocks) - cloth_.thickest;
+  if (list.bent > 0) {
+    --list.bent;
+    left = blocks_.gap(list.blocks) - cloth_.thickest;
   } else {
-    state.left = blocks_.distance(state.blocks, cloth_.thickest + least) - cloth_.thickest;
-    state.bent_for = state.left >= least ? 0 : std::min(2 * state.bent_for + 1, kMostBent);
-    state.bent = state.bent_for;
+    left = blocks_.distance(list.blocks, cloth_.thickest + least) - cloth_.thickest;
+    list.bent_for = left >= least ? 0 : std::min(2 * list.bent_for + 1, kMostBent);
+    list.bent = list.bent_for;
   }
-  if (state.left >= least) return;
+  if (left >= least) return left;
   // what is joined is never farther apart
   list.reach =
-      reach + (blocks_.are_joined(state.blocks) ? kBeyondJoined : kBeyond) * cloth_.thickest;
+      reach + (blocks_.are_joined(list.blocks) ? kBeyondJoined : kBeyond) * cloth_.thickest;
   list.all = candidates_of(
-      cloth_, find_pairs(cloth_, blocks_, state.blocks, x, reach, list.reach, scratch.search));
+      cloth_, find_pairs(cloth_, blocks_, list.blocks, x, reach, list.reach, scratch.search));
   list.reach -= kOfRounding * blocks_.rounding();
-  state.left = list.reach;
-  place(state.blocks, list.made_at);
+  place(list.blocks, list.made_at);
   if (list.corners[0] == list.corners[1]) list.corners = far_corners(list.made_at);
   list.axes = axes_through(list.made_at, list.corners);
-  state.has_some = !list.all.empty();
-}
-
-void PairLists::prune(const Matrix3Xd& x, double reach, State& state, List& list) {
-  state.near_left = state.left;
-  nearer(list.all, x, reach, list.near, state.near_left);
-  state.is_near = !list.near.empty();
+  list.has_some = !list.all.empty();
+  return list.reach;
 }
 
 }  // namespace weft

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/cloth_contact/block_motion.h"
@@ -42,19 +43,22 @@ class PairLists {
   template <class F>
   void for_each_list(const F& f) const {
     for (std::size_t k = 0; k < states_.size(); ++k)
-      if (states_[k].is_near) f(states_[k].blocks, lists_[k]->near, states_[k].came);
+      if (const State& state = states_[k]; state.is_near)
+        f(lists_[k]->blocks, lists_[k]->near, came(state.one, state.other));
   }
 
  private:
   // What is looked at in every window, and what in some.
   struct State {
-    BlockPair blocks;
-    double left = -1, near_left = -1;  // of the reach of all, and of what is near, m
-    double came = 0;                   // in the window, where it may be due, m
-    bool has_some = false, is_near = false;
-    int bent = 0, bent_for = 0;  // how often it is not asked whether they lie flat
+    int one, other;  // nodes
+    bool is_near = false;
+    double left = -1;   // of the reach of what is near, m
+    double beyond = 0;  // that, of the reach of all, m
   };
   struct List {
+    BlockPair blocks;
+    bool has_some = false;
+    int bent = 0, bent_for = 0;                // how often it is not asked whether they lie flat
     double reach = 0;                          // when it was made, m; 0: it was not
     Places made_at = {};                       // of the particles of both blocks
     std::array<Eigen::Index, 3> corners = {};  // of these, far from each other when first made
@@ -73,20 +77,27 @@ class PairLists {
     Places now;
   };
 
-  double came(int one, int other) const;  // no more than kMostMotion
+  static int number(int node) { return node; }
+  static int number(const NearBlocks::Node& node) { return node.number; }
+  double came(int one, int other) const { return at_most(in_window_.between(one, other)); }
+  // Motion that is told, m.
+  double at_most(double motion) const {
+    const double most = kMostMotion * cloth_.thickest;
+    return motion < most ? motion : most;
+  }
+  template <class Entry, class IsDue>
+  std::vector<std::size_t> find_due(std::span<Entry> entries, const IsDue& is_due,
+                                    ThreadPool& pool);
   double spare(double come) const;
   void meet(const std::vector<std::size_t>& closer);
   void add(const std::vector<BlockPair>& met, bool only);
   double least_left(double come) const;
   void find_room();
-  int number(int block) const { return blocks_.number(block); }
   void place(const BlockPair& blocks, Places& at) const;
   double change(const BlockPair& blocks, const List& list, Places& now) const;
-  bool is_due(const State& state) const;
   void look_closer(const Matrix3Xd& x, Scratch& scratch, State& state, List& list);
-  void renew(const Matrix3Xd& x, double least, double reach, Scratch& scratch, State& state,
-             List& list);
-  static void prune(const Matrix3Xd& x, double reach, State& state, List& list);
+  double renew(const Matrix3Xd& x, double left, double least, double reach, Scratch& scratch,
+               State& state, List& list);
 
   const Cloth& cloth_;
   NearBlocks blocks_;

@@ -27,11 +27,15 @@ double thickness_between(const Cloth& cloth, int one, double one_thickness, int 
                                                       : (one_thickness + other_thickness) / 2;
 }
 
+// Both without branches, which nothing foretells.
 bool share_end(const std::array<int, 2>& one, const std::array<int, 2>& other) {
-  return one[0] == other[0] || one[0] == other[1] || one[1] == other[0] || one[1] == other[1];
+  const auto& [a, b] = one;
+  const auto& [c, d] = other;
+  return (a == c) | (a == d) | (b == c) | (b == d);
 }
 bool has(const std::array<int, 3>& triangle, int particle) {
-  return triangle[0] == particle || triangle[1] == particle || triangle[2] == particle;
+  const auto& [a, b, c] = triangle;
+  return (a == particle) | (b == particle) | (c == particle);
 }
 
 std::array<int, 4> particles_of_corner(const Cloth& cloth, const ClothPair& pair) {
@@ -51,9 +55,11 @@ class Distances {
  public:
   Distances(bool edges, const Matrix3Xd& x, const F& f) : batch_(edges, x), f_(f) {}
 
-  void add(const Pair& pair, const std::array<int, 4>& particles) {
+  void add(const Pair& pair, const std::array<int, 4>& particles) { add_if(true, pair, particles); }
+  // Without branches, which nothing foretells.
+  void add_if(bool wanted, const Pair& pair, const std::array<int, 4>& particles) {
     pairs_[batch_.size()] = pair;
-    batch_.add(particles);
+    batch_.add_if(wanted, particles);
     if (batch_.full()) finish();
   }
   void finish() {
@@ -185,27 +191,33 @@ ClothPairs find_pairs(const Cloth& cloth, NearBlocks& near, const BlockPair& blo
                       NearBlocks::Search& search) {
   ClothPairs found;
   const double boxes_within = cloth.thickest + reach_of_others;
+  const auto is_far = [&](double squared) {
+    const double within = cloth.thickest + reach_of_others;
+    return !(squared < within * within);
+  };
   const auto keep_corner = [&](const ClothPair& pair, double squared) {
+    if (is_far(squared)) return;
     keep_nearer(pair, squared, thickness_of_corner(cloth, pair.first, pair.second), reach,
                 found.corners, reach_of_others);
   };
   Distances<ClothPair, decltype(keep_corner)> corners(false, x, keep_corner);
   const auto add_corners = [&](int one, int other) {
     for (const ClothPair& pair : near.near_corners(one, other, boxes_within, search))
-      if (!has(corners_of(cloth, pair.second), pair.first))
-        corners.add(pair, particles_of_corner(cloth, pair));
+      corners.add_if(!has(corners_of(cloth, pair.second), pair.first), pair,
+                     particles_of_corner(cloth, pair));
   };
   add_corners(blocks.one, blocks.other);
   if (blocks.one != blocks.other) add_corners(blocks.other, blocks.one);
   corners.finish();
   const auto keep_edges = [&](const ClothPair& pair, double squared) {
+    if (is_far(squared)) return;
     keep_nearer(pair, squared, thickness_of_edges(cloth, pair.first, pair.second), reach,
                 found.edges, reach_of_others);
   };
   Distances<ClothPair, decltype(keep_edges)> edges(true, x, keep_edges);
   for (const ClothPair& pair : near.near_edges(blocks, boxes_within, search))
-    if (!share_end(ends_of(cloth, pair.first), ends_of(cloth, pair.second)))
-      edges.add(pair, particles_of_edges(cloth, pair));
+    edges.add_if(!share_end(ends_of(cloth, pair.first), ends_of(cloth, pair.second)), pair,
+                 particles_of_edges(cloth, pair));
   edges.finish();
   std::sort(found.corners.begin(), found.corners.end());
   std::sort(found.edges.begin(), found.edges.end());

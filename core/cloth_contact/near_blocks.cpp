@@ -18,11 +18,7 @@ NearBlocks::NearBlocks(const Cloth& cloth)
     : cloth_(cloth),
       flat_(cloth, 4 * static_cast<int>(cloth.first_block.size() - 1)),
       box_(cloth.first_block.size() - 1),
-      is_boxed_(box_.size()),
-      has_boxes_(box_.size()),
-      triangle_box_(cloth.triangles.size()),
-      edge_box_(cloth.edges.size()),
-      corner_box_(cloth.corners.size()) {
+      is_boxed_(box_.size()) {
   nodes_.resize(4 * box_.size());
   number_.resize(box_.size());
   number_node(root());
@@ -118,65 +114,48 @@ bool NearBlocks::are_joined(const BlockPair& blocks) const {
   return false;
 }
 
-void NearBlocks::box_parts(int block) {
-  const auto b = static_cast<std::size_t>(block);
-  has_boxes_[b].in(now_, [&] {
-    const auto first = static_cast<std::size_t>(cloth_.first_block[b]),
-               last = static_cast<std::size_t>(cloth_.first_block[b + 1]);
-    for (std::size_t t = first; t < last; ++t) {
-      const auto& [i, j, k] = cloth_.triangles[t];
-      const Eigen::Array4f p = place(i), q = place(j), r = place(k);
-      triangle_box_[t] = small_box(p.min(q).min(r), p.max(q).max(r));
-    }
-    for (int e = cloth_.first_edge[first]; e < cloth_.first_edge[last]; ++e) {
-      const auto& [i, j] = cloth_.edges[static_cast<std::size_t>(e)];
-      const Eigen::Array4f p = place(i), q = place(j);
-      edge_box_[static_cast<std::size_t>(e)] = small_box(p.min(q), p.max(q));
-    }
-    for (int c = cloth_.first_corner[first]; c < cloth_.first_corner[last]; ++c) {
-      const Eigen::Array4f p = place(cloth_.corners[static_cast<std::size_t>(c)]);
-      corner_box_[static_cast<std::size_t>(c)] = small_box(p, p);
-    }
-  });
-}
-
 float NearBlocks::reach_of_boxes(double reach) const {
   return static_cast<float>(std::max(reach + rounding_, 0.0));
 }
 
-// Of first ... last - 1 those near a block.
-void NearBlocks::choose(const std::vector<SmallBox>& boxes, int first, int last, int near,
-                        double reach, SmallBoxes& chosen) {
+// Of parts those near a block.
+void NearBlocks::choose(const SmallBoxes::Parts& parts, int near, double reach,
+                        SmallBoxes& chosen) {
   const Box& box = block_box(near);
   Eigen::Array4f low = Eigen::Array4f::Zero(), high = low;
   low.head<3>() = box.min().array().cast<float>();
   high.head<3>() = box.max().array().cast<float>();
-  chosen.choose(std::span(boxes).subspan(static_cast<std::size_t>(first),
-                                         static_cast<std::size_t>(last - first)),
-                first, small_box(low, high), reach_of_boxes(reach));
+  chosen.choose(parts, about_.data(), small_box(low, high), reach_of_boxes(reach));
 }
 
 void NearBlocks::choose_triangles(int block, int near, double reach, SmallBoxes& chosen) {
   const auto b = static_cast<std::size_t>(block);
-  box_parts(block);
-  choose(triangle_box_, cloth_.first_block[b], cloth_.first_block[b + 1], near, reach, chosen);
+  const int first = cloth_.first_block[b], last = cloth_.first_block[b + 1];
+  choose({cloth_.triangles[static_cast<std::size_t>(first)].data(), 3, last - first, first}, near,
+         reach, chosen);
 }
 
 void NearBlocks::choose_edges(int block, int near, double reach, SmallBoxes& chosen) {
-  const auto b = static_cast<std::size_t>(block);
-  box_parts(block);
-  choose(edge_box_, cloth_.first_edge[static_cast<std::size_t>(cloth_.first_block[b])],
-         cloth_.first_edge[static_cast<std::size_t>(cloth_.first_block[b + 1])], near, reach,
-         chosen);
+  const auto [first, last] = of_block(cloth_.first_edge, block);
+  if (first == last) return chosen.clear();
+  choose({cloth_.edges[static_cast<std::size_t>(first)].data(), 2, last - first, first}, near,
+         reach, chosen);
 }
 
 void NearBlocks::choose_corners(int block, int near, double reach, SmallBoxes& chosen) {
-  const auto b = static_cast<std::size_t>(block);
-  box_parts(block);
-  choose(corner_box_, cloth_.first_corner[static_cast<std::size_t>(cloth_.first_block[b])],
-         cloth_.first_corner[static_cast<std::size_t>(cloth_.first_block[b + 1])], near, reach,
+  const auto [first, last] = of_block(cloth_.first_corner, block);
+  if (first == last) return chosen.clear();
+  choose({&cloth_.corners[static_cast<std::size_t>(first)], 1, last - first, first}, near, reach,
          chosen);
   for (int& k : chosen.numbers()) k = cloth_.corners[static_cast<std::size_t>(k)];
+}
+
+// Where a list of edges or particles has those of a block: from, to.
+std::pair<int, int> NearBlocks::of_block(const std::vector<int>& first, int block) const {
+  const auto b = static_cast<std::size_t>(block);
+  const auto begin = static_cast<std::size_t>(cloth_.first_block[b]),
+             end = static_cast<std::size_t>(cloth_.first_block[b + 1]);
+  return {first[begin], first[end]};
 }
 
 // Of those chosen and others all that are near each other.

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/cloth_contact/flat_patches.h"
@@ -105,7 +106,6 @@ class NearBlocks {
   const Box& block_box(int block);
   Box& box(const Node& node) { return nodes_[static_cast<std::size_t>(node.number)]; }
   void box_node(const Node& node);
-  void box_parts(int block);
   template <class IsFar, class Near>
   void share_out_within(const Node& node, const IsFar& is_far, const Near& near) {
     if (node.count() == 1) return near(BlockPair{node.first, node.first});
@@ -125,8 +125,8 @@ class NearBlocks {
                         is_far, near);
   }
   void number_node(const Node& node);
-  void choose(const std::vector<SmallBox>& boxes, int first, int last, int near, double reach,
-              SmallBoxes& chosen);
+  std::pair<int, int> of_block(const std::vector<int>& first, int block) const;
+  void choose(const SmallBoxes::Parts& parts, int near, double reach, SmallBoxes& chosen);
   void choose_triangles(int block, int near, double reach, SmallBoxes& chosen);
   void choose_edges(int block, int near, double reach, SmallBoxes& chosen);
   void choose_corners(int block, int near, double reach, SmallBoxes& chosen);
@@ -138,15 +138,14 @@ class NearBlocks {
   std::vector<int> first_particle_, particles_;  // of each block
   std::vector<Box> nodes_, box_;                 // nodes: empty where not known
   std::vector<int> known_nodes_;
-  std::int64_t now_ = 0;                        // counts what was set
-  std::vector<MadeOnce> is_boxed_, has_boxes_;  // each block; its parts
-  std::vector<int> number_;                     // of each block
-  std::vector<FlatPatches::Blocks> around_;     // each: some that may be flat together
+  std::int64_t now_ = 0;                     // counts what was set
+  std::vector<MadeOnce> is_boxed_;           // each block
+  std::vector<int> number_;                  // of each block
+  std::vector<FlatPatches::Blocks> around_;  // each: some that may be flat together
 
   const Matrix3Xd* x_ = nullptr;
   Places about_;         // the same
   double rounding_ = 0;  // of the gap between small boxes, m
-  std::vector<SmallBox> triangle_box_, edge_box_, corner_box_;
 };
 
 class NearBlocks::Search {

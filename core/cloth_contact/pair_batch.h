@@ -31,7 +31,7 @@ class PairBatch {
     particles_[size_++] = particles;
   }
 
-  // The same, or nothing; however far they are, they are near.
+  // The same, or nothing, where find_near() is not asked.
   void add_if(bool wanted, const std::array<int, 4>& particles) {
     particles_[size_] = particles;
     size_ += wanted ? 1 : 0;

@@ -26,22 +26,58 @@ class Surroundings {
       all = hn::And(all, hn::Le(hn::Load(d, box.side.data() + k), hn::Load(d, most_ + k)));
     return hn::AllTrue(d, all) ? 1 : 0;
   }
+  // Of a side.
+  HWY_INLINE const float* most(std::size_t side) const { return most_ + side; }
 
  private:
   HWY_ALIGN float most_[8];
 };
 
+using CornerTag = hn::CappedTag<float, 4>;
+constexpr std::size_t kOfCorner = hn::MaxLanes(CornerTag());
+
 // Without branches, which nothing foretells.
-std::size_t choose_boxes(std::span<const SmallBox> boxes, int first, const SmallBox& near,
-                         float reach, int* number, SmallBox* box) {
+template <int kEach>
+HWY_INLINE std::size_t choose_parts(const SmallBoxes::Parts& parts, const float* places,
+                                    const SmallBox& near, float reach, int* number, SmallBox* box) {
+  const CornerTag d;
   const Surroundings around(near, reach);
   std::size_t n = 0;
-  for (std::size_t k = 0; k < boxes.size(); ++k) {
-    number[n] = first + static_cast<int>(k);
-    box[n] = boxes[k];
-    n += around.has(boxes[k]);
+  for (int part = 0; part < parts.count; ++part) {
+    const int* const particle = parts.particles + std::ptrdiff_t{kEach} * part;
+    auto all = hn::FirstN(d, kOfCorner);
+    for (std::size_t k = 0; k < 4; k += kOfCorner) {
+      const auto place = [&](int i) HWY_ATTR {
+        return hn::Load(d, places + std::ptrdiff_t{4} * particle[i] + k);
+      };
+      auto low = place(0);
+      auto high = low;
+      for (int i = 1; i < kEach; ++i) {
+        low = hn::Min(low, place(i));
+        high = hn::Max(high, place(i));
+      }
+      const auto minus_high = hn::Neg(high);
+      hn::Store(low, d, box[n].side.data() + k);
+      hn::Store(minus_high, d, box[n].side.data() + 4 + k);
+      all = hn::And(all, hn::And(hn::Le(low, hn::Load(d, around.most(k))),
+                                 hn::Le(minus_high, hn::Load(d, around.most(4 + k)))));
+    }
+    number[n] = parts.first + part;
+    n += hn::AllTrue(d, all) ? 1 : 0;
   }
   return n;
+}
+
+std::size_t choose_boxes(const SmallBoxes::Parts& parts, const float* places, const SmallBox& near,
+                         float reach, int* number, SmallBox* box) {
+  switch (parts.of_each) {
+    case 1:
+      return choose_parts<1>(parts, places, near, reach, number, box);
+    case 2:
+      return choose_parts<2>(parts, places, near, reach, number, box);
+    default:
+      return choose_parts<3>(parts, places, near, reach, number, box);
+  }
 }
 
 std::size_t meet_boxes(const SmallBoxes::Chosen& some, const SmallBoxes::Chosen& others,
@@ -67,14 +103,14 @@ namespace weft {
 HWY_EXPORT(choose_boxes);
 HWY_EXPORT(meet_boxes);
 
-void SmallBoxes::choose(std::span<const SmallBox> boxes, int first, const SmallBox& near,
+void SmallBoxes::choose(const Parts& parts, const float* places, const SmallBox& near,
                         float reach) {
-  if (number_.size() < boxes.size()) {
-    number_.resize(boxes.size());
-    box_.resize(boxes.size());
+  if (number_.size() < static_cast<std::size_t>(parts.count)) {
+    number_.resize(static_cast<std::size_t>(parts.count));
+    box_.resize(static_cast<std::size_t>(parts.count));
   }
   size_ =
-      HWY_DYNAMIC_DISPATCH(choose_boxes)(boxes, first, near, reach, number_.data(), box_.data());
+      HWY_DYNAMIC_DISPATCH(choose_boxes)(parts, places, near, reach, number_.data(), box_.data());
 }
 
 std::span<const ClothPair> SmallBoxes::meet(const SmallBoxes& others, bool ascending, float reach,

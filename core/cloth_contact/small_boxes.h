@@ -22,9 +22,16 @@ struct alignas(32) SmallBox {
 // Boxes with numbers; which are near each other is looked up in vectors.
 class SmallBoxes {
  public:
-  // Of `boxes`, numbered from `first` on, those no farther from one than `reach` along any axis, m,
-  // at least 0.
-  void choose(std::span<const SmallBox> boxes, int first, const SmallBox& near, float reach);
+  // Particles of some parts of a cloth, as many of each: 1 to 3. Parts are numbered from `first`
+  // on.
+  struct Parts {
+    const int* particles;
+    int of_each, count, first;
+  };
+  // Of boxes around each of these those no farther from one than `reach` along any axis, m, at
+  // least 0. places: of particles, (4 x particles) m, aligned; fourth components are 0.
+  void choose(const Parts& parts, const float* places, const SmallBox& near, float reach);
+  void clear() { size_ = 0; }
   // Numbers of those chosen.
   std::span<int> numbers() { return std::span(number_).first(size_); }
   // Of each of these and each of the others, or each after it, those as near to each other; in

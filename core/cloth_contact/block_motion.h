@@ -20,13 +20,12 @@ class BlockMotion {
 
   // How far what is in two nodes, or blocks, moved in relation to each other, at most, m: what both
   // moved by lies in a box around theirs.
-  double between(int one, int other) const { return root(squared(one, other)); }
-  // In two steps, of which the second can be taken for several at once.
+  double between(int one, int other) const { return rounded(std::sqrt(squared(one, other))); }
+  // The same in two steps, for roots of several can be taken at once.
   float squared(int one, int other) const {
     const Box &a = box_[static_cast<std::size_t>(one)], &b = box_[static_cast<std::size_t>(other)];
     return (a.high.max(b.high) - a.low.min(b.low)).matrix().squaredNorm();
   }
-  static double root(float squared) { return rounded(std::sqrt(squared)); }
   static double rounded(float root) { return kOfRounding * double{root} + kRounding; }
 
  private:

@@ -77,14 +77,14 @@ class PairLists {
     Places now;
   };
 
-  static int number(int node) { return node; }
-  static int number(const NearBlocks::Node& node) { return node.number; }
   double came(int one, int other) const { return at_most(in_window_.between(one, other)); }
-  // Motion that is told, m.
+  // m; no more than kMostMotion.
   double at_most(double motion) const {
     const double most = kMostMotion * cloth_.thickest;
     return motion < most ? motion : most;
   }
+  static int number(int node) { return node; }
+  static int number(const NearBlocks::Node& node) { return node.number; }
   template <class Entry, class IsDue>
   std::vector<std::size_t> find_due(std::span<Entry> entries, const IsDue& is_due,
                                     ThreadPool& pool);

@@ -25,21 +25,14 @@ HWY_INLINE Triple<Row> load_places(const float* places, const int* particle) {
   return {hn::Set(d, place[0]), hn::Set(d, place[1]), hn::Set(d, place[2])};
 }
 #else
-// Of particles number `first`, `first` + 4, ...: one in each block of four lanes.
-template <class D>
-HWY_INLINE hn::Vec<D> load_fours(D d, const float* places, const int* first) {
-  if constexpr (hn::MaxLanes(D()) == 4) {
-    return hn::Load(d, places + std::ptrdiff_t{4} * *first);
-  } else {
-    const hn::Half<D> half;
-    return hn::Combine(d, load_fours(half, places, first + hn::MaxLanes(half)),
-                       load_fours(half, places, first));
-  }
-}
 HWY_INLINE Triple<Row> load_places(const float* places, const int* particle) {
   const GradientTag d;
-  const Row a = load_fours(d, places, particle), b = load_fours(d, places, particle + 1),
-            c = load_fours(d, places, particle + 2), e = load_fours(d, places, particle + 3);
+  // of the first particle, the fifth, ...; of the second, ...
+  const auto fours = [&](std::size_t at) HWY_ATTR {
+    return load_parts(d,
+                      [&](std::size_t k) { return places + std::ptrdiff_t{4} * particle[at + k]; });
+  };
+  const Row a = fours(0), b = fours(1), c = fours(2), e = fours(3);
   const Row ac = hn::InterleaveLower(d, a, c), be = hn::InterleaveLower(d, b, e);
   return {hn::InterleaveLower(d, ac, be), hn::InterleaveUpper(d, ac, be),
           hn::InterleaveLower(d, hn::InterleaveUpper(d, a, c), hn::InterleaveUpper(d, b, e))};

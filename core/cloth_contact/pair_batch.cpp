@@ -23,24 +23,13 @@ HWY_INLINE Point load_point(const Of& values) {
   return {of(point[0]), of(point[1]), of(point[2])};
 }
 #else
-template <class D, class F>
-HWY_INLINE hn::Vec<D> load_twos(D d, const F& f, std::size_t first) {
-  if constexpr (hn::MaxLanes(D()) == 2) {
-    return hn::LoadU(hn::FixedTag<double, 2>(), f(first));
-  } else {
-    const hn::Half<D> half;
-    return hn::Combine(d, load_twos(half, f, first + hn::MaxLanes(half)),
-                       load_twos(half, f, first));
-  }
-}
 // values(k): where the three values of the k-th lie.
 template <class Of>
 HWY_INLINE Point load_point(const Of& values) {
   const PairTag d;
   // of those with even and odd numbers
   const auto twos = [&](std::size_t odd, std::size_t axis) HWY_ATTR {
-    return load_twos(
-        d, [&](std::size_t k) { return values(k + odd) + axis; }, 0);
+    return load_parts(d, [&](std::size_t k) { return values(k + odd) + axis; });
   };
   const Values even = twos(0, 0), odd = twos(1, 0);
   return {hn::InterleaveLower(d, even, odd), hn::InterleaveUpper(d, even, odd),

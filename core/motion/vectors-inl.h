@@ -16,6 +16,21 @@ HWY_BEFORE_NAMESPACE();
 namespace weft::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+#if HWY_TARGET != HWY_SCALAR
+// As many values from each of several places as fill 128 bits: place(k) is where lane k, the first
+// of these, and what follows it are read.
+template <class D, class F>
+HWY_INLINE hn::Vec<D> load_parts(D d, const F& place, std::size_t first = 0) {
+  if constexpr (hn::MaxLanes(D()) * sizeof(hn::TFromD<D>) <= 16) {
+    return hn::LoadU(d, place(first));
+  } else {
+    const hn::Half<D> half;
+    return hn::Combine(d, load_parts(half, place, first + hn::MaxLanes(half)),
+                       load_parts(half, place, first));
+  }
+}
+#endif
+
 template <class V>
 struct Triple {
   V x, y, z;

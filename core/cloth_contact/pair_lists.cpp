@@ -281,19 +281,22 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
   std::size_t known = 0;
   const auto keep = [&] {
     states_.push_back(old_states[known]);
-    lists_.push_back(std::move(old_lists[known++]));
+    lists_.push_back(std::move(old_lists[known]));
   };
   const auto is_known = [&] { return known < old_states.size(); };
   for (const BlockPair& blocks : met) {
-    while (is_known() && old_lists[known]->blocks < blocks) only ? void(++known) : keep();
+    for (; is_known() && old_lists[known]->blocks < blocks; ++known)
+      if (!only) keep();
     if (is_known() && old_lists[known]->blocks == blocks) {
       keep();
+      ++known;
     } else {
       states_.push_back({blocks_.number(blocks.one), blocks_.number(blocks.other)});
       lists_.push_back(std::make_unique<List>(List{.blocks = blocks}));
     }
   }
-  while (!only && is_known()) keep();
+  if (only) return;
+  for (; is_known(); ++known) keep();
 }
 
 // How long it holds then, m; left: how long it does.

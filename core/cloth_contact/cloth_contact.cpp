@@ -203,8 +203,7 @@ void ClothContact::act(std::span<MovingSheet> sheets, const Window& past, bool e
                            sheet.dynamics.inverse_mass.end());
   const Separation::Ways ways{begin_, x_, d_, inverse_mass_};
   const int others = std::max(1, static_cast<int>(scene_.sheets.size()) - 1);
-  separation_.touch(near_, untangling_, ways, PairLists::kMostMotion * cloth_.thickest, others,
-                    pool);
+  separation_.touch(near_, untangling_, ways, others, pool);
   if (separation_.empty()) return separation_.forget_given();
   has_met_ = true;
   const double steps =

@@ -1,5 +1,7 @@
 #include "core/cloth_contact/pair_batch.h"
 
+#include <cmath>
+
 // compiled again for every target
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "core/cloth_contact/pair_batch.cpp"
@@ -180,18 +182,25 @@ void PairBatch::solve() {
     HWY_DYNAMIC_DISPATCH(solve_corners)(planes);
 }
 
-void PairBatch::find_near(std::span<const Mover> movers) {
-  near_size_ = 0;
-  // without branches, which nothing foretells
+// Without branches, which nothing foretells.
+void PairBatch::find_met(std::span<const Mover> movers) {
+  std::size_t near = 0;
   for (std::size_t k = 0; k < size_; ++k) {
-    near_[near_size_] = k;
-    near_particles_[near_size_] = particles_[k];
-    const bool is_near = (squared_[k] < within_[k] * within_[k]) & (squared_[k] > 0);
-    near_size_ += is_near ? 1 : 0;
+    met_[near] = k;
+    met_particles_[near] = particles_[k];
+    near += (squared_[k] < within_[k] * within_[k]) & (squared_[k] > 0) ? 1 : 0;
   }
-  fill(near_particles_, near_size_);
+  fill(met_particles_, near);
   HWY_DYNAMIC_DISPATCH(find_farthest)
-  ({edges_, movers.data(), near_particles_.data(), squared_way_, squared_in_step_, near_size_});
+  ({edges_, movers.data(), met_particles_.data(), squared_way_, squared_in_step_, near});
+  met_size_ = 0;
+  for (std::size_t n = 0; n < near; ++n) {
+    const std::size_t k = met_[n];
+    met_[met_size_] = k;
+    squared_in_step_[met_size_] = squared_in_step_[n];
+    const double room = std::sqrt(squared_[k]) - thickness_[k];
+    met_size_ += (room > 0) & (room * room >= squared_way_[n]) ? 0 : 1;
+  }
 }
 
 }  // namespace weft

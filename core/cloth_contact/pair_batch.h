@@ -23,15 +23,16 @@ class PairBatch {
   bool full() const { return size_ == kMost; }
   std::size_t size() const { return size_; }
   void clear() { size_ = 0; }
-  // A particle and the corners of a triangle, or the ends of two edges; within: how near is near,
-  // m. Precondition: not full.
-  void add(const std::array<int, 4>& particles,
-           double within = std::numeric_limits<double>::infinity()) {
-    within_[size_] = within;
+  // A particle and the corners of a triangle, or the ends of two edges, that came no farther than
+  // so in relation to each other, m. Precondition: not full.
+  void add(const std::array<int, 4>& particles, double thickness = 0,
+           double come = std::numeric_limits<double>::infinity()) {
+    thickness_[size_] = thickness;
+    within_[size_] = thickness + come;
     particles_[size_++] = particles;
   }
 
-  // The same, or nothing, where find_near() is not asked.
+  // The same, or nothing, where find_met() is not asked.
   void add_if(bool wanted, const std::array<int, 4>& particles) {
     particles_[size_] = particles;
     size_ += wanted ? 1 : 0;
@@ -47,13 +48,12 @@ class PairBatch {
   Vector3d apart(std::size_t k) const { return {apart_[0][k], apart_[1][k], apart_[2][k]}; }
   double squared(std::size_t k) const { return squared_[k]; }
 
-  // Finds which are near, but do not touch, and how far all particles of the one side of each move
-  // from all of the other at most.
-  void find_near(std::span<const Mover> movers);
-  std::size_t near_size() const { return near_size_; }
-  // Of the n-th: which it is; squared, m^2.
-  std::size_t near(std::size_t n) const { return near_[n]; }
-  double squared_way(std::size_t n) const { return squared_way_[n]; }
+  // Finds which may have come nearer than their thickness, as far as all particles of the one side
+  // moved from all of the other at most, but do not touch.
+  void find_met(std::span<const Mover> movers);
+  std::size_t met_size() const { return met_size_; }
+  // Of the n-th: which it is; how far its sides move from each other in a step, squared, m^2.
+  std::size_t met(std::size_t n) const { return met_[n]; }
   double squared_in_step(std::size_t n) const { return squared_in_step_[n]; }
 
   // Of vectors: kMost values each.
@@ -79,10 +79,10 @@ class PairBatch {
 
   bool edges_;
   const double* x_;
-  std::size_t size_ = 0, near_size_ = 0;
-  Particles particles_, near_particles_;
-  std::array<double, kMost> within_;
-  std::array<std::size_t, kMost> near_;
+  std::size_t size_ = 0, met_size_ = 0;
+  Particles particles_, met_particles_;
+  std::array<double, kMost> thickness_, within_;
+  std::array<std::size_t, kMost> met_;
   alignas(64) double weights_[4][kMost];
   alignas(64) double apart_[3][kMost];
   alignas(64) double squared_[kMost];

@@ -19,10 +19,10 @@ std::size_t hash(const std::array<int, 4>& particle) {
 }  // namespace
 
 void Separation::touch(std::span<const NearCloth> near, const Untangling& untangling,
-                       const Ways& ways, double most, int layers, ThreadPool& pool) {
+                       const Ways& ways, int layers, ThreadPool& pool) {
   constexpr std::int64_t kLeastShare = 64;  // lists, of a thread
   if (!near.empty()) set_out(ways, pool);
-  const Surroundings around{untangling, ways, movers_, most, static_cast<double>(layers)};
+  const Surroundings around{untangling, ways, movers_, static_cast<double>(layers)};
   const std::size_t shares = shares_of(pool, std::ssize(near), kLeastShare);
   found_.resize(2 * shares);
   for (const bool edges : {false, true})
@@ -48,9 +48,9 @@ void Separation::touch(bool edges, std::span<const NearCloth> near, const Surrou
   std::array<Waiting, PairBatch::kMost> waiting;
   const auto solve = [&] {
     batch.solve();
-    batch.find_near(around.movers);
-    for (std::size_t n = 0; n < batch.near_size(); ++n) {
-      const auto& [candidate, friction] = waiting[batch.near(n)];
+    batch.find_met(around.movers);
+    for (std::size_t n = 0; n < batch.met_size(); ++n) {
+      const auto& [candidate, friction] = waiting[batch.met(n)];
       add(*candidate, friction, batch, n, around, found);
     }
     batch.clear();
@@ -66,23 +66,20 @@ void Separation::touch(bool edges, std::span<const NearCloth> near, const Surrou
     const NearCloth& cloth = near[n];
     for (const Candidate& candidate : of_kind(n)) {
       waiting[batch.size()] = {&candidate, cloth.friction};
-      batch.add(candidate.particle, candidate.thickness + cloth.come);
+      batch.add(candidate.particle, candidate.thickness, cloth.come);
       if (batch.full()) solve();
     }
   }
   solve();
 }
 
-// That may have come nearer than its thickness, as far as its particles moved in relation to each
-// other.
 void Separation::add(const Candidate& candidate, double friction, const PairBatch& batch,
-                     std::size_t near, const Surroundings& around, Found& found) {
+                     std::size_t met, const Surroundings& around, Found& found) {
   constexpr double kLeastReach = 0.02;      // of the thickness, where things nearly touch
   constexpr double kLeastMoves = 0.01;      // of its lightest particle's 1 / mass
   constexpr double kMostGivenIfHeld = 0.1;  // of the thickness
-  const std::size_t k = batch.near(near), ends = batch.edges() ? 2 : 1;
+  const std::size_t k = batch.met(met), ends = batch.edges() ? 2 : 1;
   const double distance = std::sqrt(batch.squared(k)), room = distance - candidate.thickness;
-  if (room >= around.most || (room > 0 && room * room >= batch.squared_way(near))) return;
   if (!around.untangling.empty() && around.untangling.has(candidate.particle)) return;
 
   const std::array<double, 4> weight = batch.weights(k);
@@ -102,7 +99,7 @@ void Separation::add(const Candidate& candidate, double friction, const PairBatc
   for (double& part : share) part /= moves;
   const double reach =
       std::max(std::min(distance / 2, candidate.thickness / 4), kLeastReach * candidate.thickness);
-  if (const double in_step = batch.squared_in_step(near); in_step > 0)
+  if (const double in_step = batch.squared_in_step(met); in_step > 0)
     found.most_steps = std::min(found.most_steps, reach / std::sqrt(in_step));
 
   PairContact& contact = found.contacts.emplace_back();
@@ -132,7 +129,8 @@ void Separation::set_out(const Ways& ways, ThreadPool& pool) {
 }
 
 void Separation::separate(double steps) {
-  constexpr int kMostPasses = 12, kUnmoved = -1;
+  constexpr int kMostPasses = 4;  // more in one window came no nearer to the truth, nor to rest
+  constexpr int kUnmoved = -1;
   changed_.assign(movers_.size(), kUnmoved);
   const Movers movers{movers_, changed_};
   // what was given the last time

@@ -41,11 +41,11 @@ class Separation {
     const Matrix3Xd &from, &to, &in_step;
     std::span<const double> inverse_mass;
   };
-  // Finds the candidates that may have come nearer than their thickness on their way, as far as
-  // they came less far than `most` (m) in relation to each other, without those that are led apart.
+  // Finds the candidates that may have come nearer than their thickness on their way, without those
+  // that are led apart.
   // layers: how many may fall onto one, which gives for all, as many thicknesses at most.
   void touch(std::span<const NearCloth> near, const Untangling& untangling, const Ways& ways,
-             double most, int layers, ThreadPool& pool);
+             int layers, ThreadPool& pool);
   bool empty() const {
     return std::ranges::all_of(found_, [](const Found& found) { return found.contacts.empty(); });
   }
@@ -70,7 +70,7 @@ class Separation {
     const Untangling& untangling;
     const Ways& ways;
     std::span<const Mover> movers;
-    double most, layers;
+    double layers;
   };
   struct Found {
     std::vector<PairContact> contacts;
@@ -80,7 +80,7 @@ class Separation {
   static void touch(bool edges, std::span<const NearCloth> near, const Surroundings& around,
                     Found& found);
   static void add(const Candidate& candidate, double friction, const PairBatch& batch,
-                  std::size_t near, const Surroundings& around, Found& found);
+                  std::size_t met, const Surroundings& around, Found& found);
   void set_out(const Ways& ways, ThreadPool& pool);
   template <class F>
   void for_each_contact(const F& f) {

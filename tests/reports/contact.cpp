@@ -65,6 +65,8 @@ void costs(Page& page, bool large) {
   const std::vector<std::tuple<std::string, Scene, double>> cases = {
       {"hangs and swings, triangles", hung(n, false), 1.0},
       {"hangs and swings, lattice", hung(n, true), 1.0},
+      {"the same in air (drag 2/s), triangles", hung(n, false, 2), 1.0},
+      {"the same in air (drag 2/s), lattice", hung(n, true, 2), 1.0},
       {"falls onto a ball", draped(n), 1.0},
       {"ten sheets fall onto a ball", stacked(layers), large ? 1.0 : 0.6}};
   for (const auto& [says, scene, seconds] : cases) {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <variant>
 
 #include "core/contact/body.h"
 #include "core/triangles/cut.h"
@@ -202,10 +203,12 @@ Scene two_layers(int n) {
 
 }  // namespace
 
-Scene hung(int n, bool lattice) {
+Scene hung(int n, bool lattice, double drag) {
   const double width = 0.01 * (n - 1);
   SheetDefinition sheet =
       lattice ? sheet_of("sheet", Grid{n, n, 0.01}) : rectangle("sheet", width, width, 0.01);
+  auto& textile = std::get<MeasuredTextile>(sheet.textile.model);
+  textile.air_drag = drag * textile.areal_density;
   const Matrix3Xd x = start_positions(sheet);
   for (Eigen::Index i = 0; i < x.cols(); ++i)
     if (x(0, i) < 1e-9 && (x(2, i) < 1e-9 || x(2, i) > width - 1e-9)) {

@@ -16,8 +16,8 @@ struct ContactScene {
 };
 
 // A sheet of n x n particles that hangs from two corners and touches nothing; as triangles, or as a
-// lattice.
-Scene hung(int n, bool lattice);
+// lattice; in air that slows it by `drag`, 1/s.
+Scene hung(int n, bool lattice, double drag = 0);
 // A sheet of n x n particles, 10 mm apart, that falls onto a ball of 0.15 m given as triangles.
 Scene draped(int n);
 // Ten sheets of n x n particles over one another that fall onto such a ball.

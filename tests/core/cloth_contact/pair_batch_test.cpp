@@ -64,42 +64,49 @@ TEST(PairBatch, FindsTheNearestPointsThatThePlainFunctionsFind) {
   }
 }
 
-TEST(PairBatch, FindsWhatIsNearAndHowFarItsSidesCameFromEachOther) {
+TEST(PairBatch, FindsWhatMayHaveComeNearerThanItsThickness) {
   const auto size = static_cast<int>(PairBatch::kMost);
-  const Matrix3Xd x = points_of_pairs(size), ways = noise(4 * size, 5), steps = noise(4 * size, 7);
+  const Matrix3Xd x = points_of_pairs(size), ways = 0.3 * noise(4 * size, 5),
+                  steps = noise(4 * size, 7);
   std::vector<Mover> movers;
   for (Eigen::Index i = 0; i < x.cols(); ++i) {
     Mover& mover = movers.emplace_back();
     mover.way << ways.col(i), 0;
     mover.in_step << steps.col(i), 0;
   }
+  constexpr double kThickness = 0.1;
+  const auto come = [](int pair) { return 0.1 * (pair % 8); };
   for (const bool edges : {false, true}) {
     PairBatch batch(edges, x);
-    const auto within = [](int pair) { return 0.1 * (pair % 8); };
-    for (int k = 0; k < size; ++k) batch.add({4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3}, within(k));
+    for (int k = 0; k < size; ++k)
+      batch.add({4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 3}, kThickness, come(k));
     batch.solve();
-    batch.find_near(movers);
-    std::vector<std::size_t> near, wanted;
-    for (std::size_t n = 0; n < batch.near_size(); ++n) near.push_back(batch.near(n));
-    for (std::size_t k = 0; k < batch.size(); ++k) {
-      const double distance = std::sqrt(batch.squared(k));
-      if (distance > 0 && distance < within(static_cast<int>(k))) wanted.push_back(k);
-    }
-    EXPECT_EQ(near, wanted);
-    EXPECT_GT(near.size(), 0);
-    EXPECT_LT(near.size(), batch.size());
-    const Eigen::Index ends = edges ? 2 : 1;
-    for (std::size_t n = 0; n < batch.near_size(); ++n) {
-      const Eigen::Index first = 4 * static_cast<Eigen::Index>(batch.near(n));
-      double way = 0, in_step = 0;
+    batch.find_met(movers);
+    // of all particles of the one side to all of the other
+    const auto farthest = [&](const Matrix3Xd& motion, std::size_t pair) {
+      const Eigen::Index first = 4 * static_cast<Eigen::Index>(pair), ends = edges ? 2 : 1;
+      double most = 0;
       for (Eigen::Index i = first; i < first + ends; ++i)
-        for (Eigen::Index j = first + ends; j < first + 4; ++j) {
-          way = std::max(way, (ways.col(i) - ways.col(j)).squaredNorm());
-          in_step = std::max(in_step, (steps.col(i) - steps.col(j)).squaredNorm());
-        }
-      EXPECT_NEAR(batch.squared_way(n), way, 1e-15);
-      EXPECT_NEAR(batch.squared_in_step(n), in_step, 1e-15);
+        for (Eigen::Index j = first + ends; j < first + 4; ++j)
+          most = std::max(most, (motion.col(i) - motion.col(j)).squaredNorm());
+      return most;
+    };
+    std::vector<std::size_t> met, wanted;
+    for (std::size_t n = 0; n < batch.met_size(); ++n) {
+      met.push_back(batch.met(n));
+      EXPECT_NEAR(batch.squared_in_step(n), farthest(steps, batch.met(n)), 1e-15);
     }
+    int near = 0;
+    for (std::size_t k = 0; k < batch.size(); ++k) {
+      const double distance = std::sqrt(batch.squared(k)), room = distance - kThickness;
+      if (distance == 0 || room >= come(static_cast<int>(k))) continue;
+      ++near;
+      if (room <= std::sqrt(farthest(ways, k))) wanted.push_back(k);
+    }
+    EXPECT_EQ(met, wanted);
+    EXPECT_GT(met.size(), 0);
+    EXPECT_LT(met.size(), near);
+    EXPECT_LT(near, batch.size());
   }
 }
 

@@ -281,22 +281,28 @@ void PairLists::add(const std::vector<BlockPair>& met, bool only) {
   std::size_t known = 0;
   const auto keep = [&] {
     states_.push_back(old_states[known]);
-    lists_.push_back(std::move(old_lists[known]));
+    lists_.push_back(std::move(old_lists[known++]));
   };
-  const auto is_known = [&] { return known < old_states.size(); };
+  const auto keep_until = [&](std::size_t end) {
+    while (known < end) keep();
+  };
   for (const BlockPair& blocks : met) {
-    for (; is_known() && old_lists[known]->blocks < blocks; ++known)
-      if (!only) keep();
-    if (is_known() && old_lists[known]->blocks == blocks) {
+    const auto is_before = [](const std::unique_ptr<List>& list, const BlockPair& other) {
+      return list->blocks < other;
+    };
+    const auto from = old_lists.begin() + static_cast<std::ptrdiff_t>(known);
+    const auto at = std::lower_bound(from, old_lists.end(), blocks, is_before);
+    const auto end = static_cast<std::size_t>(at - old_lists.begin());
+    if (!only) keep_until(end);
+    known = end;
+    if (known < old_lists.size() && old_lists[known]->blocks == blocks) {
       keep();
-      ++known;
     } else {
       states_.push_back({blocks_.number(blocks.one), blocks_.number(blocks.other)});
       lists_.push_back(std::make_unique<List>(List{.blocks = blocks}));
     }
   }
-  if (only) return;
-  for (; is_known(); ++known) keep();
+  if (!only) keep_until(old_lists.size());
 }
 
 // How long it holds then, m; left: how long it does.

@@ -188,7 +188,8 @@ void PairBatch::find_met(std::span<const Mover> movers) {
   for (std::size_t k = 0; k < size_; ++k) {
     met_[near] = k;
     met_particles_[near] = particles_[k];
-    near += (squared_[k] < within_[k] * within_[k]) & (squared_[k] > 0) ? 1 : 0;
+    const bool is_near = (squared_[k] < within_[k] * within_[k]) & (squared_[k] > 0);
+    near += is_near ? 1 : 0;
   }
   fill(met_particles_, near);
   HWY_DYNAMIC_DISPATCH(find_farthest)
@@ -199,7 +200,8 @@ void PairBatch::find_met(std::span<const Mover> movers) {
     met_[met_size_] = k;
     squared_in_step_[met_size_] = squared_in_step_[n];
     const double room = std::sqrt(squared_[k]) - thickness_[k];
-    met_size_ += (room > 0) & (room * room >= squared_way_[n]) ? 0 : 1;
+    const bool stays = (room > 0) & (room * room >= squared_way_[n]);
+    met_size_ += stays ? 0 : 1;
   }
 }
 

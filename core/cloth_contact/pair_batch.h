@@ -23,8 +23,8 @@ class PairBatch {
   bool full() const { return size_ == kMost; }
   std::size_t size() const { return size_; }
   void clear() { size_ = 0; }
-  // A particle and the corners of a triangle, or the ends of two edges, that came no farther than
-  // so in relation to each other, m. Precondition: not full.
+  // A particle and the corners of a triangle, or the ends of two edges; come: how far they came in
+  // relation to each other at most, m. Precondition: not full.
   void add(const std::array<int, 4>& particles, double thickness = 0,
            double come = std::numeric_limits<double>::infinity()) {
     thickness_[size_] = thickness;

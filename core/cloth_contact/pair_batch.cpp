@@ -199,7 +199,8 @@ void PairBatch::find_met(std::span<const Mover> movers) {
     const std::size_t k = met_[n];
     met_[met_size_] = k;
     squared_in_step_[met_size_] = squared_in_step_[n];
-    const double room = std::sqrt(squared_[k]) - thickness_[k];
+    distance_[met_size_] = std::sqrt(squared_[k]);
+    const double room = distance_[met_size_] - thickness_[k];
     const bool stays = (room > 0) & (room * room >= squared_way_[n]);
     met_size_ += stays ? 0 : 1;
   }

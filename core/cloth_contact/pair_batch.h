@@ -52,8 +52,10 @@ class PairBatch {
   // moved from all of the other at most, but do not touch.
   void find_met(std::span<const Mover> movers);
   std::size_t met_size() const { return met_size_; }
-  // Of the n-th: which it is; how far its sides move from each other in a step, squared, m^2.
+  // Of the n-th: which it is; its distance, m; how far its sides move from each other in a step,
+  // squared, m^2.
   std::size_t met(std::size_t n) const { return met_[n]; }
+  double distance(std::size_t n) const { return distance_[n]; }
   double squared_in_step(std::size_t n) const { return squared_in_step_[n]; }
 
   // Of vectors: kMost values each.
@@ -81,7 +83,7 @@ class PairBatch {
   const double* x_;
   std::size_t size_ = 0, met_size_ = 0;
   Particles particles_, met_particles_;
-  std::array<double, kMost> thickness_, within_;
+  std::array<double, kMost> thickness_, within_, distance_;
   std::array<std::size_t, kMost> met_;
   alignas(64) double weights_[4][kMost];
   alignas(64) double apart_[3][kMost];

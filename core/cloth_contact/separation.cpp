@@ -79,7 +79,7 @@ void Separation::add(const Candidate& candidate, double friction, const PairBatc
   constexpr double kLeastMoves = 0.01;      // of its lightest particle's 1 / mass
   constexpr double kMostGivenIfHeld = 0.1;  // of the thickness
   const std::size_t k = batch.met(met), ends = batch.edges() ? 2 : 1;
-  const double distance = std::sqrt(batch.squared(k)), room = distance - candidate.thickness;
+  const double distance = batch.distance(met), room = distance - candidate.thickness;
   if (!around.untangling.empty() && around.untangling.has(candidate.particle)) return;
 
   const std::array<double, 4> weight = batch.weights(k);
@@ -129,7 +129,7 @@ void Separation::set_out(const Ways& ways, ThreadPool& pool) {
 }
 
 void Separation::separate(double steps) {
-  constexpr int kMostPasses = 4;  // more in one window came no nearer to the truth, nor to rest
+  constexpr int kMostPasses = 4;  // what is left over is answered in the next window
   constexpr int kUnmoved = -1;
   changed_.assign(movers_.size(), kUnmoved);
   const Movers movers{movers_, changed_};

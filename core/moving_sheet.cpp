@@ -26,7 +26,10 @@ void MovingSheet::set_mesh(const Scene& scene, const SheetDefinition& definition
     flat_ = mesh.surface;
     ease_rest_shape(definition, dressing.ease, mesh);
   }
-  if (!scene.environment.wind) mesh.triangles = std::vector<std::array<int, 3>>();
+  if (scene.environment.wind)
+    dynamics.density = mesh.mass.sum() / area_of(definition);
+  else
+    mesh.triangles = std::vector<std::array<int, 3>>();
   skin = definition.skin_or_default();
   set_pins(definition);
   set_air_and_weight(scene);
@@ -90,10 +93,11 @@ void MovingSheet::bind_forces(const Scene& scene) {
     force.setZero(3, x.cols());
     add_fast_forces(mesh, x, v, force);
   };
-  dynamics.slow_force = [&scene, this](double time, const Matrix3Xd& x, const Matrix3Xd& v,
-                                       Matrix3Xd& force) {
+  dynamics.slow_force = [&scene, this](double time, double lag, const Matrix3Xd& x,
+                                       const Matrix3Xd& v, Matrix3Xd& force) {
     if (!mesh.stencils.empty()) add_isometric_forces(mesh, x, force);
-    if (scene.environment.wind) add_wind_forces(*scene.environment.wind, mesh, time, x, v, force);
+    if (scene.environment.wind)
+      add_wind_forces(*scene.environment.wind, mesh, time, lag / dynamics.density, x, v, force);
   };
   dynamics.air = [&scene](double time) {
     return scene.environment.wind ? air_velocity(*scene.environment.wind, time)

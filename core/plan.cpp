@@ -113,12 +113,15 @@ double bending_stiffness(const PlannedSheet& sheet) {
 
 // Substeps in one of which slow forces may act: as many as the scene bears, where they then are a
 // small part of what bounds the step, and where impulses in time with the stiffest modes feed these
-// by less than damping takes away, that of a relaxation too.
+// by less than damping takes away, that of a relaxation too. Drag alone costs too little to wait.
 int slow_every(const Scene& scene, const std::vector<PlannedSheet>& planned,
                const std::vector<StableStep>& steps, const StepPlan& step) {
   constexpr double kMostOfBound = 0.25;  // of 4
   std::int64_t every = std::min<std::int64_t>(scene.solver.slow_forces_every, step.substeps);
   if (every == 1 || !is_verlet(scene.solver.integrator)) return 1;
+  const bool only_drag = std::ranges::all_of(
+      planned, [](const PlannedSheet& sheet) { return sheet.mesh.stencils.empty(); });
+  if (only_drag && !scene.environment.wind) return 1;
   const double dt = step.substep;
   for (std::size_t s = 0; s < planned.size(); ++s) {
     const Mesh& mesh = planned[s].mesh;
@@ -236,10 +239,10 @@ void describe_poses(const Scene& scene, Plan& plan) {
 }  // namespace
 
 int StepPlan::slow_in(std::int64_t k) const {
-  const std::int64_t groups = (substeps + slow_every - 1) / slow_every;
-  const auto begin = [&](std::int64_t group) { return (group * substeps + groups - 1) / groups; };
-  const std::int64_t group = k * groups / substeps;
-  return k == begin(group) ? static_cast<int>(begin(group + 1) - k) : 0;
+  const std::int64_t group = k / slow_every, first = group * slow_every;
+  const std::int64_t size = std::min<std::int64_t>(slow_every, substeps - first);
+  const std::int64_t middle = std::min((size + group % 2) / 2, size - 1);
+  return k == first + middle ? static_cast<int>(size) : 0;
 }
 
 std::optional<StepRefusal> find_refusal(const StepPlan& step, const SolverSettings& solver,

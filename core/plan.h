@@ -24,8 +24,9 @@ struct StepPlan {
   double unsheared_bound = 0;  // for shapes that shear little; 0: not asked for
   int slow_every = 1;          // substeps in one of which slow forces act, at most
 
-  // How many times as strongly slow forces act in substep k of a frame: they stand for it and those
-  // after it up to the next one in which they do, as many each time, or one less.
+  // How many times as strongly slow forces act in substep k of a frame: amid so many substeps, for
+  // all of which they stand, or 0. Amid as many that are odd they act half a substep early and late
+  // in turns.
   int slow_in(std::int64_t k) const;
 
   // The longest that is not refused, s.

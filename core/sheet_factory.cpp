@@ -66,6 +66,13 @@ double damping_of(const SheetDefinition& sheet, const Mesh& mesh, double ratio) 
   return damping_for(sample_of(grid_of(sheet), mesh).mesh, ratio);
 }
 
+double area_of(const SheetDefinition& sheet) {
+  if (std::holds_alternative<Triangles>(sheet.shape))
+    return areas(rest_shape(triangles_in(sheet))).sum();
+  const auto [warp, weft] = extent(sheet.shape);
+  return warp * weft * sheet.spacing() * sheet.spacing();
+}
+
 Tethers make_tethers(const SheetDefinition& sheet) {
   if (!sheet.tether_stretch) return {};
   Tethers tethers = find_attachments(sheet);

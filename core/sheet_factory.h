@@ -28,6 +28,8 @@ StableStep stable_step_of(const SheetDefinition& sheet, const Mesh& mesh,
 double unsheared_gain_of(const SheetDefinition& sheet, const Mesh& mesh,
                          const VectorXd& inverse_mass, IntegratorKind integrator, double air_rate);
 double damping_of(const SheetDefinition& sheet, const Mesh& mesh, double ratio);
+// Of the flat sheet, m^2.
+double area_of(const SheetDefinition& sheet);
 
 // What keeps a sheet's free particles within the reach of held ones, if it asks for that.
 Tethers make_tethers(const SheetDefinition& sheet);

@@ -194,7 +194,7 @@ void Simulation::State::begin_again() {
 // Begins a sheet with the step as it now is.
 void Simulation::State::start(std::size_t sheet, const Matrix3Xd& x, const Matrix3Xd& v,
                               double time) {
-  sheets[sheet].dynamics.slow_every = plan.step.slow_in(0);
+  sheets[sheet].dynamics.slow_every = plan.step.slow_every;
   sheets[sheet].solver->start(x, v, time, plan.step.substep);
 }
 

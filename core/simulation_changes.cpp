@@ -39,7 +39,7 @@ void Simulation::State::restart(const SheetStates& states, double old_dt,
   const double dt = plan.step.substep;
   for (std::size_t s = 0; s < sheets.size(); ++s) {
     sheets[s].budget = {};
-    const bool keeps_pace = dt == old_dt && plan.step.slow_in(0) == sheets[s].dynamics.slow_every;
+    const bool keeps_pace = dt == old_dt && plan.step.slow_every == sheets[s].dynamics.slow_every;
     if (!changed[s] && keeps_pace) continue;
     start(s, states.x[s], states.v[s], time());
     sheets[s].read_good();

@@ -9,8 +9,8 @@ Vector3d air_velocity(const Wind& wind, double time) {
   return wind.velocity * (1 + wind.gust * std::sin(2 * std::numbers::pi * time / wind.gust_period));
 }
 
-void add_wind_forces(const Wind& wind, const Mesh& mesh, double time, const Matrix3Xd& x,
-                     const Matrix3Xd& v, Matrix3Xd& force) {
+void add_wind_forces(const Wind& wind, const Mesh& mesh, double time, double give,
+                     const Matrix3Xd& x, const Matrix3Xd& v, Matrix3Xd& force) {
   const Vector3d air = air_velocity(wind, time);
   for (const auto& [a, b, c] : mesh.triangles) {
     // |cross| is twice the area
@@ -20,9 +20,11 @@ void add_wind_forces(const Wind& wind, const Mesh& mesh, double time, const Matr
     const Vector3d normal = cross / twice_area;
     const Vector3d relative = air - (v.col(a) + v.col(b) + v.col(c)) / 3;
     const double along = relative.dot(normal);
-    const Vector3d corner_force = twice_area / 6 *
-                                  (wind.air_density / 2 * std::abs(along) * along * normal +
-                                   wind.tangential_drag * (relative - along * normal));
+    const double felt = along / (1 + give * wind.air_density / 2 * std::abs(along));
+    const Vector3d corner_force =
+        twice_area / 6 *
+        (wind.air_density / 2 * std::abs(felt) * felt * normal +
+         wind.tangential_drag / (1 + give * wind.tangential_drag) * (relative - along * normal));
     force.col(a) += corner_force;
     force.col(b) += corner_force;
     force.col(c) += corner_force;

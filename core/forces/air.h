@@ -9,8 +9,9 @@ Vector3d air_velocity(const Wind& wind, double time);
 
 // Adds the force of moving air on every triangle, a third to each corner:
 // F = 1/2 rho A |v_n| v_n n + c_t A v_t, v = air minus facet velocity. x: m; v: m/s; force: N. (3 x
-// n)
-void add_wind_forces(const Wind& wind, const Mesh& mesh, double time, const Matrix3Xd& x,
-                     const Matrix3Xd& v, Matrix3Xd& force);
+// n). give: what a pressure gives cloth until velocities feel it, m/s per Pa: v is what that leaves
+// of what x and v say, to first order, so that an impulse acts at the velocity amid it.
+void add_wind_forces(const Wind& wind, const Mesh& mesh, double time, double give,
+                     const Matrix3Xd& x, const Matrix3Xd& v, Matrix3Xd& force);
 
 }  // namespace weft

@@ -22,8 +22,13 @@ HWY_INLINE Triple<V> blow(D d, const WindLaw<hn::TFromD<D>>& wind, const Triple<
   const Triple<V> air{hn::Set(d, wind.velocity[0]), hn::Set(d, wind.velocity[1]),
                       hn::Set(d, wind.velocity[2])};
   const Triple<V> relative = minus_times(air, three_w, hn::Set(d, wind.to_velocity));
-  const V along = hn::Mul(dot(relative, cross), inverse);
-  const V speed = hn::Abs(along), pressure = hn::Set(d, wind.pressure);
+  const V along = hn::Mul(dot(relative, cross), inverse), speed = hn::Abs(along);
+  V pressure = hn::Set(d, wind.pressure);
+  if (wind.lag > 0) {
+    const V one = hn::Set(d, hn::TFromD<D>(1));
+    const V share = hn::Div(one, hn::MulAdd(hn::Set(d, wind.lag), speed, one));
+    pressure = hn::Mul(pressure, hn::Mul(share, share));
+  }
   if (!(wind.drag > 0)) return times(cross, hn::Mul(along, hn::Mul(speed, pressure)));
 
   const V drag = hn::Set(d, wind.drag);

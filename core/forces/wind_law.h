@@ -14,6 +14,16 @@ struct WindLaw {
   T to_velocity = 0;            // 1 / (6 dt): what the sum of three w is multiplied by, 1/s
   T pressure = 0;               // rho / 12, kg/m^3
   T drag = 0;                   // c_t / 6, kg/(m^2 s)
+  T lag = 0;  // rho / 2 times give: u along the normal is felt as u / (1 + lag |u|)
+
+  // Sets `law` to so many times this one, with velocities as `give` of add_wind_forces() has them.
+  void act(int slow, double give, WindLaw& law) const {
+    if (!blows) return;
+    const T times = static_cast<T>(slow), gives = static_cast<T>(6 * give);
+    law.pressure = times * pressure;
+    law.drag = times * drag / (1 + gives * drag);
+    law.lag = gives * pressure;
+  }
 };
 
 template <class T>

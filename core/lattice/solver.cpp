@@ -223,8 +223,7 @@ class LatticeSolver : public SheetSolver {
   void set_slow(int slow) {
     law_.slow = static_cast<T>(slow);
     law_.wind.blows = wind_.blows && slow > 0;
-    law_.wind.pressure = law_.slow * wind_.pressure;
-    law_.wind.drag = law_.slow * wind_.drag;
+    wind_.act(slow, lag_of(slow, dt_) / dynamics_.density, law_.wind);
     law_.drag = static_cast<T>(slow * drag_rate_ * dt_);
     law_.drag_share = T(1) / (T(1) + law_.drag / 2);
   }

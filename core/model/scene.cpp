@@ -17,11 +17,11 @@ Vector3d offset_at(const Path& path, double time) {
 
 SolverSettings default_settings(Accuracy accuracy) {
   SolverSettings settings;
+  if (accuracy != Accuracy::kFine) settings.slow_forces_every = 4;
   if (accuracy == Accuracy::kDraft) {
     settings.max_self_weight_strain = 0.01;
     settings.step_bound = StepBound::kUnsheared;
     settings.integrator = IntegratorKind::kLaggedVerlet;
-    settings.slow_forces_every = 4;
   }
   if (accuracy == Accuracy::kFine) {
     settings.precision = Precision::kDouble;

@@ -184,9 +184,9 @@ struct SolverSettings {
 // has the errors.
 enum class Accuracy {
   kDraft,  // sheets stretch by 1 % under their weight where their textile would less; long steps,
-           // lagged damping, slow forces in every fourth step
-  kStandard,  // errors are far below what the mesh makes
-  kFine       // double precision and a quarter of the step
+           // lagged damping, slow forces as for kStandard
+  kStandard,  // errors are far below what the mesh makes; slow forces in every fourth step
+  kFine       // double precision and a quarter of the step, every force in each
 };
 SolverSettings default_settings(Accuracy accuracy);
 BendingLaw default_bending(Accuracy accuracy);

@@ -17,24 +17,23 @@ std::unique_ptr<Integrator> make_integrator(IntegratorKind kind) {
   return make_verlet(lead_of(kind));
 }
 
-void sum_forces(const Dynamics& dynamics, double time, int slow, const Matrix3Xd& x,
+void sum_forces(const Dynamics& dynamics, double time, int slow, double lag, const Matrix3Xd& x,
                 const Matrix3Xd& v, Matrix3Xd& force) {
   dynamics.force(time, x, v, force);
   if (slow == 0 || !dynamics.slow_force) return;
-  if (slow == 1) return dynamics.slow_force(time, x, v, force);
+  if (slow == 1) return dynamics.slow_force(time, lag, x, v, force);
   Matrix3Xd once = Matrix3Xd::Zero(3, x.cols());
-  dynamics.slow_force(time, x, v, once);
+  dynamics.slow_force(time, lag, x, v, once);
   force += slow * once;
 }
 
 void accelerate(const Dynamics& dynamics, double time, const Matrix3Xd& x, const Matrix3Xd& v,
                 Matrix3Xd& a) {
-  const int slow = dynamics.slow_every;
-  sum_forces(dynamics, time, slow, x, v, a);
-  if (dynamics.drag.size() > 0) {
+  const bool each = dynamics.slow_every == 1;
+  sum_forces(dynamics, time, each ? 1 : 0, 0, x, v, a);
+  if (each && dynamics.drag.size() > 0) {
     const Vector3d air = dynamics.air(time);
-    for (Eigen::Index i = 0; i < a.cols(); ++i)
-      a.col(i) += slow * dynamics.drag[i] * (air - v.col(i));
+    for (Eigen::Index i = 0; i < a.cols(); ++i) a.col(i) += dynamics.drag[i] * (air - v.col(i));
   }
   for (Eigen::Index i = 0; i < a.cols(); ++i) {
     const double inverse_mass = dynamics.inverse_mass[i];

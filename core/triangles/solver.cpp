@@ -228,8 +228,7 @@ class TriangleSolver : public SheetSolver {
 
   void set_slow(int slow) {
     law_.slow = static_cast<T>(slow);
-    law_.wind.pressure = law_.slow * wind_.pressure;
-    law_.wind.drag = law_.slow * wind_.drag;
+    wind_.act(slow, lag_of(slow, dt_) / dynamics_.density, law_.wind);
   }
 
   // Numbers the particles of hinges apart.

@@ -129,7 +129,9 @@ class AccuracyPage {
       if (m.kernels()) single.add(ours.rms / m.find({.precision = Precision::kDouble})->rms);
     }
     page_.text(fmt::format(
-        "- The defaults (Verlet, 32 segments, single precision, the planned step) end {} mm from "
+        "- The defaults (Verlet, 32 segments, single precision, the planned step; slow forces in "
+        "each "
+        "substep, as everywhere here unless it says otherwise) end {} mm from "
         "the truth (RMS), no particle farther than {} mm. A simulated second takes {} s of a "
         "core.\n"
         "- The mesh changes positions by {} mm, {} times as much: what a shorter step, more "

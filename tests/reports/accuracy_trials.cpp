@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -114,14 +115,16 @@ void slow_forces(Page& page) {
       "With `solver.slow_forces_every` n wind, drag and the bending of ISOMETRIC act in one of n "
       "substeps, n times as strongly. {0} x {0} particles, STANDARD else: RMS distance in mm "
       "after {1:.2g} s from the run in which they act in each, and in brackets the time over "
-      "what that run takes, the shortest of {2} each. DRAFT takes 4.",
+      "what that run takes, the shortest of {2} each. Where wind blows, or a grid bends by "
+      "ISOMETRIC, STANDARD and DRAFT take 4.",
       kSize, kMostFrames / 60.0, kRuns));
   std::vector<Cells> rows;
   for (const char* name : {"hang", "flag"}) {
-    for (const auto& [law, bending] :
-         {std::pair<const char*, BendingLaw>("CHOI_KO", ChoiKo{}),
-          std::pair<const char*, BendingLaw>("ISOMETRIC", Isometric{})}) {
-      const Case given = make_case(name, kSize);
+    for (const auto& [law, bending, triangles] :
+         {std::tuple<const char*, BendingLaw, bool>("CHOI_KO", ChoiKo{}, false),
+          std::tuple<const char*, BendingLaw, bool>("ISOMETRIC", Isometric{}, false),
+          std::tuple<const char*, BendingLaw, bool>("triangles", Isometric{}, true)}) {
+      const Case given = triangles ? make_triangle_case(name, kSize) : make_case(name, kSize);
       const std::array every = {1, 2, 4, 8, 16};
       std::array<Outcome, every.size()> outcomes;
       for (int k = 0; k < kRuns; ++k)

@@ -41,7 +41,7 @@ Vector3d wind_force(const Wind& wind, int particles, double spacing) {
   const SheetDefinition sheet = airy_sheet(particles, particles, spacing, 0);
   const Matrix3Xd x = start_positions(sheet), v = Matrix3Xd::Zero(3, x.cols());
   Matrix3Xd force = Matrix3Xd::Zero(3, x.cols());
-  add_wind_forces(wind, make_lattice(sheet), 0, x, v, force);
+  add_wind_forces(wind, make_lattice(sheet), 0, 0, x, v, force);
   return force.rowwise().sum();
 }
 

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <utility>
 #include <vector>
 
 #include "core/sheet_factory.h"
 #include "tests/support/core/scenes.h"
+#include "tests/support/core/triangle_meshes.h"
 #include "tests/support/core/wrapped_solver.h"
 
 namespace weft::testing {
@@ -69,6 +69,27 @@ TEST(SlowForces, AreOfSecondOrderInTheTimeBetweenThem) {
   EXPECT_NEAR(error / halved, 4, 0.6);
 }
 
+// Much of the wind depends on velocities, which do not know yet of what it is about to do. The wind
+// gives 100 m/s^2 at first; a velocity that is half of 8 substeps old would be 0.014 m/s off.
+TEST(SlowForces, OfWindAreFeltAtTheVelocityAmidTheirImpulseAndFramesShowWhatTheyLeave) {
+  for (const bool triangles : {false, true}) {
+    const auto blown = [&](int slow_every) {
+      Scene scene = hung(slow_every, 1e-6);
+      if (triangles) scene.sheets[0].shape = complete(triangle_mesh(scattered(15, 1.0 / 14)));
+      scene.environment.gravity.setZero();
+      scene.environment.wind = Wind{.velocity = {1, 2, 6}, .tangential_drag = 0.2};
+      scene.solver.substep = 1.0 / 60 / 512;
+      Simulation simulation(scene);
+      EXPECT_EQ(simulation.plan().step.slow_every, slow_every);
+      for (int k = 0; k < 6; ++k) EXPECT_TRUE(simulation.advance_frame());
+      return std::pair(positions(simulation), velocities(simulation));
+    };
+    const auto each = blown(1), rarely = blown(8);
+    EXPECT_LT(apart(each.first, rarely.first), 1e-6);
+    EXPECT_LT(apart(each.second, rarely.second), 1e-4);
+  }
+}
+
 TEST(SlowForces, LetASheetFallThroughAirAsItsEquationSays) {
   constexpr double kRate = 2, kGravity = 9.8;  // 1/s, m/s^2
   for (const int slow_every : {1, 4, 12}) {
@@ -96,7 +117,7 @@ TEST(SlowForces, ChangeAHungSheetByMuchLessThanDraftIsOff) {
     };
     const Matrix3Xd each = after_a_fifth(1);
     for (const int slow_every : {2, 4})
-      EXPECT_LT(apart(after_a_fifth(slow_every), each), windy ? 2e-4 : 2e-6) << slow_every;
+      EXPECT_LT(apart(after_a_fifth(slow_every), each), windy ? 1e-5 : 2e-6) << slow_every;
   }
 }
 
@@ -114,7 +135,7 @@ class Noting : public WrappedSolver {
   std::vector<int>& noted_;
 };
 
-TEST(SlowForces, AreAskedForOnceInAGroupOfSubstepsAndStandForAllOfThem) {
+TEST(SlowForces, AreAskedForOnceAmidAGroupOfSubstepsAndStandForAllOfThem) {
   Scene scene = hung(4);
   scene.solver.substep = scene.solver.frame_step / 90;
   std::vector<int> noted;
@@ -124,10 +145,9 @@ TEST(SlowForces, AreAskedForOnceInAGroupOfSubstepsAndStandForAllOfThem) {
   });
   ASSERT_TRUE(simulation.advance_frame());
   ASSERT_EQ(noted.size(), 90);
-  EXPECT_EQ(90 - std::count(noted.begin(), noted.end(), 0), 23);
-  for (std::size_t k = 0; k < noted.size(); k += static_cast<std::size_t>(noted[k]))
-    ASSERT_THAT(noted[k], ::testing::AnyOf(3, 4)) << k;
-  EXPECT_EQ(std::accumulate(noted.begin(), noted.end(), 0), 90);
+  for (std::size_t k = 0; k < 88; ++k) ASSERT_EQ(noted[k], k % 4 == 2 ? 4 : 0) << k;
+  EXPECT_EQ(noted[88], 0);
+  EXPECT_EQ(noted[89], 2);
 }
 
 TEST(SlowForces, ActOftenerWhereTheyAreNotSlowBesideTheStep) {

@@ -16,13 +16,12 @@ struct WindLaw {
   T drag = 0;                   // c_t / 6, kg/(m^2 s)
   T lag = 0;  // rho / 2 times give: u along the normal is felt as u / (1 + lag |u|)
 
-  // Sets `law` to so many times this one, with velocities as `give` of add_wind_forces() has them.
-  void act(int slow, double give, WindLaw& law) const {
-    if (!blows) return;
-    const T times = static_cast<T>(slow), gives = static_cast<T>(6 * give);
-    law.pressure = times * pressure;
-    law.drag = times * drag / (1 + gives * drag);
-    law.lag = gives * pressure;
+  // To so many times what `once` has, in wind that blows. give: see add_wind_forces().
+  void set_strength(const WindLaw& once, int times, double give) {
+    const T gives = static_cast<T>(6 * give);
+    pressure = static_cast<T>(times) * once.pressure;
+    drag = static_cast<T>(times) * once.drag / (1 + gives * once.drag);
+    lag = gives * once.pressure;
   }
 };
 

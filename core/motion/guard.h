@@ -12,7 +12,7 @@ inline constexpr double kFarthest = 1e9;
 inline constexpr double kMostStrain = 10;
 
 // What rounding may bring a sheet to that lies still, m/s.
-inline constexpr double kStillSpeed = 1e-3;
+inline constexpr double kStillSpeed = 1e-4;
 
 // A sheet at the end of a frame. (3 x particles)
 struct SheetState {

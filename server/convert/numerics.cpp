@@ -1,17 +1,13 @@
 #include "server/convert/numerics.h"
 
-#include <sstream>
+#include <fmt/format.h>
 
 #include "core/fingerprint.h"
 
 namespace weft {
 
 std::string numerics_id() {
-  static const std::string id = [] {
-    std::ostringstream text;
-    text << "weft-" WEFT_VERSION "-" << std::hex << fingerprint();
-    return text.str();
-  }();
+  static const std::string id = fmt::format("weft-{}-{:016x}", WEFT_VERSION, fingerprint());
   return id;
 }
 

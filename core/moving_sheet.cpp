@@ -93,11 +93,11 @@ void MovingSheet::bind_forces(const Scene& scene) {
     force.setZero(3, x.cols());
     add_fast_forces(mesh, x, v, force);
   };
-  dynamics.slow_force = [&scene, this](double time, double lag, const Matrix3Xd& x,
+  dynamics.slow_force = [&scene, this](double time, double give, const Matrix3Xd& x,
                                        const Matrix3Xd& v, Matrix3Xd& force) {
     if (!mesh.stencils.empty()) add_isometric_forces(mesh, x, force);
     if (scene.environment.wind)
-      add_wind_forces(*scene.environment.wind, mesh, time, lag / dynamics.density, x, v, force);
+      add_wind_forces(*scene.environment.wind, mesh, time, give, x, v, force);
   };
   dynamics.air = [&scene](double time) {
     return scene.environment.wind ? air_velocity(*scene.environment.wind, time)

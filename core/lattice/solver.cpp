@@ -223,7 +223,7 @@ class LatticeSolver : public SheetSolver {
   void set_slow(int slow) {
     law_.slow = static_cast<T>(slow);
     law_.wind.blows = wind_.blows && slow > 0;
-    if (wind_.blows) law_.wind.set_strength(wind_, slow, lag_of(slow, dt_) / dynamics_.density);
+    if (wind_.blows) law_.wind.set_strength(wind_, slow, give_of(dynamics_, slow, dt_));
     law_.drag = static_cast<T>(slow * drag_rate_ * dt_);
     law_.drag_share = T(1) / (T(1) + law_.drag / 2);
   }

@@ -17,7 +17,6 @@ Vector3d offset_at(const Path& path, double time) {
 
 SolverSettings default_settings(Accuracy accuracy) {
   SolverSettings settings;
-  if (accuracy != Accuracy::kFine) settings.slow_forces_every = 4;
   if (accuracy == Accuracy::kDraft) {
     settings.max_self_weight_strain = 0.01;
     settings.step_bound = StepBound::kUnsheared;
@@ -26,6 +25,8 @@ SolverSettings default_settings(Accuracy accuracy) {
   if (accuracy == Accuracy::kFine) {
     settings.precision = Precision::kDouble;
     settings.safety /= 4;
+  } else {
+    settings.slow_forces_every = 4;
   }
   return settings;
 }

@@ -17,13 +17,13 @@ std::unique_ptr<Integrator> make_integrator(IntegratorKind kind) {
   return make_verlet(lead_of(kind));
 }
 
-void sum_forces(const Dynamics& dynamics, double time, int slow, double lag, const Matrix3Xd& x,
+void sum_forces(const Dynamics& dynamics, double time, int slow, double give, const Matrix3Xd& x,
                 const Matrix3Xd& v, Matrix3Xd& force) {
   dynamics.force(time, x, v, force);
   if (slow == 0 || !dynamics.slow_force) return;
-  if (slow == 1) return dynamics.slow_force(time, lag, x, v, force);
+  if (slow == 1) return dynamics.slow_force(time, give, x, v, force);
   Matrix3Xd once = Matrix3Xd::Zero(3, x.cols());
-  dynamics.slow_force(time, lag, x, v, once);
+  dynamics.slow_force(time, give, x, v, once);
   force += slow * once;
 }
 

@@ -19,8 +19,8 @@ struct Motion {
 struct Dynamics {
   // Writes all forces but slow ones, drag and weight, N, given time, positions and velocities.
   std::function<void(double, const Matrix3Xd&, const Matrix3Xd&, Matrix3Xd&)> force;
-  // Adds those that change slowly, N, given time, for how long velocities have not felt them, s,
-  // positions and velocities; none: there are none.
+  // Adds those that change slowly, N, given time, give (see give_of()), positions and velocities;
+  // none: there are none.
   std::function<void(double, double, const Matrix3Xd&, const Matrix3Xd&, Matrix3Xd&)> slow_force;
   // They and drag act in one of so many steps, so many times as strongly (r-RESPA, Tuckerman et al.
   // 1992): amid these, so that velocities before and after them are complete.
@@ -65,13 +65,15 @@ std::unique_ptr<Integrator> make_midpoint();
 std::unique_ptr<Integrator> make_rk4();
 std::unique_ptr<Integrator> make_integrator(IntegratorKind kind);
 
-// For how long Verlet's velocities have not felt slow forces where these act so many times as
-// strongly, s: since the first of the steps amid which they act. Where they act in each, velocities
-// are extrapolated.
-inline double lag_of(int slow, double dt) { return slow > 1 ? slow * dt / 2 : 0; }
+// The speed that a pressure gives the sheet before Verlet's velocities tell of it where slow forces
+// act so many times as strongly, m/s per Pa: from the first of the steps amid which they act. Where
+// they act in each, velocities are extrapolated.
+inline double give_of(const Dynamics& dynamics, int slow, double dt) {
+  return slow > 1 ? slow * dt / 2 / dynamics.density : 0;
+}
 
-// Writes forces but drag and weight, slow ones so many times as strong and not felt for `lag`, N.
-void sum_forces(const Dynamics& dynamics, double time, int slow, double lag, const Matrix3Xd& x,
+// Writes forces but drag and weight, slow ones so many times as strong, N.
+void sum_forces(const Dynamics& dynamics, double time, int slow, double give, const Matrix3Xd& x,
                 const Matrix3Xd& v, Matrix3Xd& force);
 // Acceleration with every force that acts in each step, m/s^2; 0 for held particles.
 void accelerate(const Dynamics& dynamics, double time, const Matrix3Xd& x, const Matrix3Xd& v,

@@ -22,7 +22,7 @@ class Verlet : public Integrator {
   void advance(const Dynamics& dynamics, double time, double dt, int slow,
                Motion& motion) override {
     velocity(motion, dt, v_);
-    sum_forces(dynamics, time, slow, lag_of(slow, dt), motion.x, v_, a_);
+    sum_forces(dynamics, time, slow, give_of(dynamics, slow, dt), motion.x, v_, a_);
     motion.d_previous.swap(motion.d);
     const bool drag = slow > 0 && dynamics.drag.size() > 0;
     const Vector3d air = drag ? dynamics.air(time) : Vector3d(Vector3d::Zero());

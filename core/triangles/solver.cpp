@@ -228,7 +228,7 @@ class TriangleSolver : public SheetSolver {
 
   void set_slow(int slow) {
     law_.slow = static_cast<T>(slow);
-    if (wind_.blows) law_.wind.set_strength(wind_, slow, lag_of(slow, dt_) / dynamics_.density);
+    if (wind_.blows) law_.wind.set_strength(wind_, slow, give_of(dynamics_, slow, dt_));
   }
 
   // Numbers the particles of hinges apart.

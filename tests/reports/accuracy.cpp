@@ -130,10 +130,8 @@ class AccuracyPage {
     }
     page_.text(fmt::format(
         "- The defaults (Verlet, 32 segments, single precision, the planned step; slow forces in "
-        "each "
-        "substep, as everywhere here unless it says otherwise) end {} mm from "
-        "the truth (RMS), no particle farther than {} mm. A simulated second takes {} s of a "
-        "core.\n"
+        "each substep, as everywhere here unless it says otherwise) end {} mm from the truth "
+        "(RMS), no particle farther than {} mm. A simulated second takes {} s of a core.\n"
         "- The mesh changes positions by {} mm, {} times as much: what a shorter step, more "
         "segments or double precision gain is not seen beside that.\n"
         "- Error in single precision: {} times that in double; by 32 segments: {} times that by "

@@ -13,6 +13,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "server/batch_threads.h"
 #include "server/rpc/asset_service.h"
 #include "server/rpc/assets.h"
 #include "server/rpc/backend.h"
@@ -133,6 +134,7 @@ struct Server::Parts {
 
 Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(options)) {
   restore_sessions(parts_->backend);
+  std::optional<BatchThreads> of_calls(std::in_place);
   enable_plugins();
   grpc::ServerBuilder builder;
   set_transport(builder, options.limits);
@@ -149,6 +151,7 @@ Server::Server(const ServerOptions& options) : parts_(std::make_unique<Parts>(op
                              make_credentials(options.tls), &port);
   }
   parts_->grpc = builder.BuildAndStart();
+  of_calls.reset();
   if (!parts_->grpc || (options.host && port == 0)) {
     throw std::runtime_error("cannot listen on " + options.host.value_or("") + ":" +
                              std::to_string(options.port) +

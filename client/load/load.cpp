@@ -100,6 +100,7 @@ class Load {
     std::vector<std::unique_ptr<Subscriber>> subscribers;
     int openings = 0;  // subscribers whose stream is to open yet
     double frame_step_s = 0;
+    std::int64_t substeps_per_frame = 0;  // as planned
     Clock::time_point origin = Clock::time_point::max();  // when its frame 0 would have been due
     std::int64_t steps = 0;                               // answered
     std::optional<std::int64_t> last_frame;               // that it computed, once that is known
@@ -113,7 +114,6 @@ class Load {
       request_.set_session(session.session.name());
       request_.set_uid(session.session.uid());
       request_.set_start_frame(1);
-      request_.mutable_format()->set_stats(true);
       if (load.order_.drive == Drive::kFree) request_.set_slow_reader(v1::SLOW_READER_HOLD_SESSION);
     }
 
@@ -306,6 +306,7 @@ class Load {
             session.session.set_name(answer->name());
             session.session.set_uid(answer->uid());
             session.frame_step_s = answer->scene().solver().frame_step_s();
+            session.substeps_per_frame = answer->plan().substeps_per_frame();
             session.openings = order_.subscribers;
             ++result_.sessions;
             if (closing_) return;
@@ -422,7 +423,6 @@ class Load {
     }
     result_.frames_lost += number - subscriber.next_frame;
     subscriber.next_frame = number + 1;
-    if (subscriber.index() == 0) result_.substeps += frame.stats().substep_count();
     if (order_.drive != Drive::kFree) {
       session.origin =
           std::min(session.origin, time - ticks(interval() * static_cast<double>(number)));
@@ -483,6 +483,7 @@ class Load {
       std::int64_t computed = session.last_frame.value_or(0);
       for (const auto& subscriber : session.subscribers)
         computed = std::max(computed, subscriber->next_frame - 1);
+      result_.substeps += computed * session.substeps_per_frame;
       for (const auto& subscriber : session.subscribers)
         result_.frames_lost += computed + 1 - subscriber->next_frame;
       for (std::int64_t frame = computed + 1; frame <= due; ++frame) {

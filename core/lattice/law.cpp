@@ -125,7 +125,6 @@ void set_columns(double edge_share, SweepLaw<T>& law) {
       at[kShare * kLanes] = static_cast<T>(has(c - 1) && has(c + 1) ? 1 : edge_share);
       at[kNearCount * kLanes] = static_cast<T>(has(c - 1) + has(c) + has(c + 1));
       at[kFarCount * kLanes] = static_cast<T>(has(c - 2) + has(c) + has(c + 2));
-      at[kHere * kLanes] = bits(has(c));
       at[kRight1 * kLanes] = bits(has(c) && has(c + 1));
       at[kRight2 * kLanes] = bits(has(c) && has(c + 2));
       at[kLeft1 * kLanes] = bits(has(c) && has(c - 1));
@@ -134,9 +133,6 @@ void set_columns(double edge_share, SweepLaw<T>& law) {
         if (has(neighbour) != has(c)) border = 1;
     }
   }
-
-  for (const int c : {layout.columns, layout.columns + 1})
-    if (layout.lane(c) < kLanes) law.padded.push_back(layout.vector(c));
 
   law.halo_exists = AlignedArray<T>(2 * layout.kHalo * kLanes);
   law.halo_folds = AlignedArray<T>(2 * layout.kHalo * kLanes);

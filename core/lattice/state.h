@@ -42,7 +42,7 @@ struct SweepBand {
   Largest<T> largest;
 };
 
-// A lattice sheet in motion. Of every vector, its planes one after the other: shared ones, which
+// A lattice sheet in motion. Lanes without a column are and stay 0. Of every vector, its planes one after the other: shared ones, which
 // neighbours read, with a halo, and local ones.
 template <class T>
 class SweepState {

@@ -162,25 +162,17 @@ class Sweep {
     const D d;
     if (r >= law_.layout.rows) return;
     T* const row = state_.shared(band_, r);
-    const auto mask = [&](T* to, const T* exists, const auto& value) HWY_ATTR {
+    for (std::size_t k = 0; k < halo_.size(); ++k) {
+      const LaneNumber<T>* const lanes = law_.halo_from.data() + k * kLanes;
+      const T* const from = row + halo_[k].vector * kShared;
+      T* const to = row + halo_[k].at * kShared;
       for (int part = 0; part < kLanes; part += kPart) {
-        const V here = hn::Load(d, exists + part);
+        const V exists = hn::Load(d, law_.halo_exists.data() + k * kLanes + part);
         for (int plane = 0; plane < planes_; plane += 3) {
           const int at = plane * kLanes + part;
-          store(only(value(at), here), to + at);
+          store(only(load_shifted(from + at, halo_[k].shift, lanes), exists), to + at);
         }
       }
-    };
-    for (const int j : law_.padded) {
-      T* const padded = row + j * kShared;
-      mask(padded, law_.columns.data() + (j * kColumnPlanes + kHere) * kLanes,
-           [&](int at) HWY_ATTR { return load(padded + at); });
-    }
-    for (std::size_t k = 0; k < halo_.size(); ++k) {
-      const T* const from = row + halo_[k].vector * kShared;
-      mask(row + halo_[k].at * kShared, law_.halo_exists.data() + k * kLanes, [&](int at) HWY_ATTR {
-        return load_shifted(from + at, halo_[k].shift, law_.halo_from.data() + k * kLanes);
-      });
     }
   }
 
@@ -508,10 +500,8 @@ class Sweep {
     const Triple<V> old = load(p.local + (State::kD - State::kShared) * kLanes);
     const Triple<V> next{move_axis<0>(p, force.x, step2), move_axis<1>(p, force.y, step2),
                          move_axis<2>(p, force.z, step2)};
-    if (law_.measured) largest_ = hn::Max(largest_, hn::And(squared(next), column(p, kHere)));
-    if (law_.changes)
-      largest_change_ =
-          hn::Max(largest_change_, hn::And(squared(minus(next, old)), column(p, kHere)));
+    if (law_.measured) largest_ = hn::Max(largest_, squared(next));
+    if (law_.changes) largest_change_ = hn::Max(largest_change_, squared(minus(next, old)));
   }
 
   template <int kAxis>
@@ -523,7 +513,7 @@ class Sweep {
     const V old = hn::Load(d, local(State::kD)), at = hn::Load(d, shared(State::kX));
     const V drift = hn::Set(d, law_.drift[kAxis]);
     const auto moves = hn::Gt(step2, hn::Zero(d));
-    V change = hn::MulAdd(force, step2, hn::IfThenElseZero(moves, drift));
+    V change = hn::IfThenElseZero(moves, hn::MulAdd(force, step2, drift));
     if (law_.drag > 0) {
       const V slowed = hn::NegMulAdd(hn::Set(d, law_.drag), old, change);
       change = hn::IfThenElseZero(moves, hn::Mul(slowed, hn::Set(d, law_.drag_share)));

@@ -52,7 +52,6 @@ enum ColumnPlane {
   kNearCount,  // how many of the columns c - 1 ... c + 1 exist
   kFarCount,   // how many of c - 2, c, c + 2
   // all bits where the column and this neighbour exist, else none
-  kHere,
   kRight1,
   kRight2,
   kLeft1,
@@ -84,7 +83,6 @@ struct SweepLaw {
 
   AlignedArray<T> columns;   // (vectors x kColumnPlanes x lanes)
   std::vector<char> border;  // of each vector: whether some column lacks a neighbour
-  std::vector<int> padded;   // vectors where lanes without a column follow the last column
   // all bits, else none: where a column of the halo exists, and which lanes of the vector that it
   // continues it holds
   AlignedArray<T> halo_exists, halo_folds;  // (2 kHalo x lanes)

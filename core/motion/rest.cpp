@@ -8,6 +8,7 @@ bool is_quiet(const Mesh& mesh, const VectorXd& inverse_mass, const Drive& drive
   const double given = drive.gravity.norm();
   const double gravity = given > 0 ? given : kStandardGravity;
   const double most_change = kForceShare * gravity * drive.frame_step;
+  const double most_energy = kEnergyShare * mesh.mass.sum() * gravity * height;
   double energy = 0, squares = 0;
   int free = 0;
   for (Eigen::Index i = 0; i < after.v.cols(); ++i) {
@@ -18,10 +19,10 @@ bool is_quiet(const Mesh& mesh, const VectorXd& inverse_mass, const Drive& drive
     else
       squares += (v - before.v.col(i)).squaredNorm();
     energy += mesh.mass[i] / 2 * v.squaredNorm();
+    if (energy > most_energy) return false;
     ++free;
   }
-  return squares <= free * most_change * most_change &&
-         energy <= kEnergyShare * mesh.mass.sum() * gravity * height;
+  return squares <= free * most_change * most_change && energy <= most_energy;
 }
 
 }  // namespace weft

@@ -78,7 +78,7 @@ grpc::Status FrameCall::take(const FoundSession& found, const std::string& uid,
 }
 
 void FrameCall::subscribe(std::optional<std::int64_t> start, SlowReader policy) {
-  subscription_ = session_->subscribe(weak_from_this(), start, policy);
+  subscription_ = session_->subscribe(weak_from_this(), start, policy, order_.format.stats());
   state_changes_ = subscription_->progress().state_changes;
 }
 

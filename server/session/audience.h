@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -39,6 +40,9 @@ class Audience {
   void add(FrameReader& reader, Time now);
   void remove(const FrameReader& reader) { std::erase(readers_, &reader); }
   bool has_any() const { return !readers_.empty(); }
+  bool wants_stats() const {
+    return std::ranges::any_of(readers_, [](const FrameReader* each) { return each->wants_stats; });
+  }
   // Readers that want every frame.
   int recorders() const;
   // Whom to tell of a new frame.

@@ -57,7 +57,7 @@ struct Frame {
   // none they were recorded, or not.
   std::shared_ptr<const Scene> scene;
   std::shared_ptr<FrameMeter> meter;
-  std::optional<Deformation> deformation;  // absent: nobody read frames when it was made
+  std::optional<Deformation> deformation;  // absent: nobody wanted it when the frame was made
   std::vector<double> pressures;           // (particles) Pa
   std::vector<double> clearances;          // (particles) m
   EncodingCache encodings;

@@ -131,9 +131,9 @@ bool Session::frame_unwanted() const {
   return !restoring_ && (queue_.has_pause() || queue_.step_cancelled());
 }
 
-bool Session::is_read() const {
+bool Session::stats_wanted() const {
   std::lock_guard lock(mutex_);
-  return audience_.has_any();
+  return audience_.wants_stats();
 }
 
 void Session::compute_frame(Clock::time_point due) {
@@ -150,7 +150,7 @@ void Session::end_frame(FramePart part, Clock::time_point due) {
   auto repairs = publish_repairs();
   if (part == FramePart::kFailed) return fail("the solver diverged: " + simulation.failure());
   timeline_.count_frame(stats_);
-  const auto frame = timeline_.make_frame(std::move(repairs), is_read());
+  const auto frame = timeline_.make_frame(std::move(repairs), stats_wanted());
   {
     std::lock_guard lock(mutex_);
     if (closed_) return;
@@ -353,10 +353,11 @@ void Session::close(Refusal::Why why) {
 
 std::unique_ptr<Subscription> Session::subscribe(std::weak_ptr<FrameSink> sink,
                                                  std::optional<std::int64_t> start,
-                                                 SlowReader policy) {
+                                                 SlowReader policy, bool wants_stats) {
   std::unique_lock lock(mutex_);
   auto subscription = std::make_unique<Subscription>(
-      shared_from_this(), FrameReader{std::move(sink), start.value_or(latest()), policy});
+      shared_from_this(),
+      FrameReader{std::move(sink), start.value_or(latest()), policy, wants_stats});
   audience_.add(subscription->reader_, Clock::now());
   release();
   lock.unlock();

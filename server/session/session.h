@@ -141,7 +141,8 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
 
   // Frames from `start` on, by default from the newest.
   std::unique_ptr<Subscription> subscribe(std::weak_ptr<FrameSink> sink,
-                                          std::optional<std::int64_t> start, SlowReader policy);
+                                          std::optional<std::int64_t> start, SlowReader policy,
+                                          bool wants_stats);
 
   // Drops frames that do not fit into its share of the history any more.
   void trim_history();
@@ -170,7 +171,7 @@ class Session : public Task, public std::enable_shared_from_this<Session> {
   bool settle_steps();
   bool go_on_with_frame();
   bool frame_unwanted() const;
-  bool is_read() const;
+  bool stats_wanted() const;
   void compute_frame(Clock::time_point due);
   void end_frame(FramePart part, Clock::time_point due);
   std::vector<Repair> publish_repairs();

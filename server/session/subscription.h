@@ -29,6 +29,7 @@ struct FrameReader {
   std::weak_ptr<FrameSink> sink;
   std::int64_t next = 0;  // frame
   SlowReader policy = SlowReader::kDisconnect;
+  bool wants_stats = false;  // energy and strain
 };
 
 // Where a session stands.

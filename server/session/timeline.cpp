@@ -34,12 +34,13 @@ Timeline::Timeline(Simulation given, std::int64_t max_frame_work, Duration snaps
 
 FramePart Timeline::advance(Scheduler& scheduler) {
   constexpr std::chrono::microseconds kSlice{20'000}, kBusySlice = Scheduler::kTurn;
+  constexpr std::chrono::microseconds kYield{1000};  // what calls wait for, at most
   const auto begin = Clock::now();
   const auto processor = thread_time();
   auto yielded = begin;
   const Enough enough = [&] {
     const auto now = Clock::now();
-    if (now - yielded >= kBusySlice) {  // to the threads of calls and streams, where they wait
+    if (now - yielded >= kYield) {  // to the threads of calls and streams, where they wait
       std::this_thread::yield();
       yielded = now;
     }
@@ -87,7 +88,8 @@ bool Timeline::drop_frame() {
   return true;
 }
 
-std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs, bool read) const {
+std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs,
+                                                  bool with_stats) const {
   auto frame = std::make_shared<Frame>();
   const std::size_t values = 3 * static_cast<std::size_t>(simulation.particle_count());
   frame->number = simulation.frame();
@@ -98,7 +100,7 @@ std::shared_ptr<const Frame> Timeline::make_frame(std::vector<Repair> repairs, b
   simulation.copy_velocities(frame->velocities);
   frame->kinetic_energy = simulation.kinetic_energy();
   frame->cloth_cuts = simulation.cloth_cuts();
-  if (read) frame->deformation = simulation.deformation();
+  if (with_stats) frame->deformation = simulation.deformation();
   frame->at_rest = simulation.at_rest();
   frame->residual = simulation.residual();
   frame->pose_times = pose_times(simulation.scene(), frame->time);

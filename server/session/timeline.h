@@ -33,9 +33,9 @@ class Timeline {
   Judgement judge() const;
   // Takes back the frame under way; false where it cannot be.
   [[nodiscard]] bool drop_frame();
-  // read: somebody waits for it, and will want to know of its energy and strain, which else are
-  // computed when somebody asks.
-  std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs, bool read) const;
+  // with_stats: somebody who waits for it wants its energy and strain, which else are computed when
+  // somebody asks.
+  std::shared_ptr<const Frame> make_frame(std::vector<Repair> repairs, bool with_stats) const;
   // Those of the present frame.
   std::vector<Repair> repairs_of_frame() const;
 

@@ -1,6 +1,10 @@
 #include "server/server.h"
 
+#include <sched.h>
+
 #include <atomic>
+#include <filesystem>
+#include <fstream>
 #include <future>
 #include <thread>
 #include <vector>
@@ -48,6 +52,20 @@ TEST(Server, ServesManyClientsAtOnce) {
   }
   clients.clear();
   EXPECT_EQ(service.info().sessions(), 0);
+}
+
+TEST(Server, ThreadsOfCallsWaitUntilOneThatAdvancesSessionsPauses) {
+  const Server server(Service::in_process());
+  int of_calls = 0;
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task")) {
+    std::string name;
+    std::ifstream(thread.path() / "comm") >> name;
+    if (name != "nexting_thread") continue;  // of gRPC, completes calls
+    ++of_calls;
+    EXPECT_EQ(sched_getscheduler(std::stoi(thread.path().filename())), SCHED_BATCH);
+  }
+  EXPECT_GT(of_calls, 0);
+  EXPECT_EQ(sched_getscheduler(0), SCHED_OTHER);
 }
 
 TEST(Server, ListensOnAFreePortAndNoOtherServerSharesIt) {

@@ -108,9 +108,9 @@ Answer run(Session& session, std::optional<std::int64_t> until_frame) {
 Answer pause(Session& session) { return {session, PauseCommand{}}; }
 
 std::shared_ptr<Watcher> Watcher::of(Session& session, std::optional<std::int64_t> start,
-                                     SlowReader policy) {
+                                     SlowReader policy, bool wants_stats) {
   auto watcher = std::make_shared<Watcher>();
-  watcher->subscription_ = session.subscribe(watcher, start, policy);
+  watcher->subscription_ = session.subscribe(watcher, start, policy, wants_stats);
   return watcher;
 }
 

@@ -61,7 +61,8 @@ Answer pause(Session& session);
 class Watcher : public FrameSink, public std::enable_shared_from_this<Watcher> {
  public:
   static std::shared_ptr<Watcher> of(Session& session, std::optional<std::int64_t> start,
-                                     SlowReader policy = SlowReader::kDisconnect);
+                                     SlowReader policy = SlowReader::kDisconnect,
+                                     bool wants_stats = false);
   void offer() override;
 
   // Waits for the next reading that is not kNothingYet.

@@ -82,16 +82,17 @@ TEST(Session, MakesNothingOfContactUntilSomebodyAsksAFrame) {
   EXPECT_EQ(later->meter->pressures(later->scene, later->positions, later->time), pressures);
 }
 
-TEST(Session, ComputesEnergyAndStrainOnlyWhereFramesAreRead) {
+TEST(Session, ComputesEnergyAndStrainOnlyWhereAReaderWantsThem) {
   Scheduler scheduler(2);
-  const auto unread = make_session(scheduler), read = make_session(scheduler);
-  const auto watcher = Watcher::of(*read, 0);
-  for (const auto& session : {unread, read}) {
+  const auto shown = make_session(scheduler), measured = make_session(scheduler);
+  const auto viewer = Watcher::of(*shown, 0);
+  const auto meter = Watcher::of(*measured, 0, SlowReader::kDisconnect, true);
+  for (const auto& session : {shown, measured}) {
     step(*session, 10).applied();
     set_bend(*session, 3e-5).applied();
     step(*session, 1).applied();
   }
-  const auto one = unread->status().newest, other = read->status().newest;
+  const auto one = shown->status().newest, other = measured->status().newest;
   EXPECT_FALSE(one->deformation);
   ASSERT_TRUE(other->deformation);
   EXPECT_EQ(one->meter->made(), 0);

@@ -100,7 +100,7 @@ class Load {
     std::vector<std::unique_ptr<Subscriber>> subscribers;
     int openings = 0;  // subscribers whose stream is to open yet
     double frame_step_s = 0;
-    std::int64_t substeps_per_frame = 0;  // as planned
+    std::int64_t substeps_per_frame = 0;                  // as planned
     Clock::time_point origin = Clock::time_point::max();  // when its frame 0 would have been due
     std::int64_t steps = 0;                               // answered
     std::optional<std::int64_t> last_frame;               // that it computed, once that is known

@@ -42,8 +42,8 @@ struct SweepBand {
   Largest<T> largest;
 };
 
-// A lattice sheet in motion. Lanes without a column are and stay 0. Of every vector, its planes one after the other: shared ones, which
-// neighbours read, with a halo, and local ones.
+// A lattice sheet in motion. Lanes without a column are and stay 0. Of every vector, its planes one
+// after the other: shared ones, which neighbours read, with a halo, and local ones.
 template <class T>
 class SweepState {
  public:

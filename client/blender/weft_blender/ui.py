@@ -115,7 +115,7 @@ class WeftScene(bpy.types.PropertyGroup):
         items=[
             ("DRAFT", "Draft", "Stretches a little more, in about half the time"),
             ("STANDARD", "Standard", "As the fabric is"),
-            ("FINE", "Fine", "To compare with: 6 to 10 times the time"),
+            ("FINE", "Fine", "To compare with: 5 to 10 times the time"),
         ],
         default="STANDARD",
     )

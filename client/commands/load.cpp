@@ -104,7 +104,7 @@ std::string load_text(const LoadOrder& order, const LoadResult& result) {
   facts.add("sessions", std::to_string(result.sessions))
       .add("frames", frames_text(order, result))
       .add("received", fmt::format("{:.1f} frames/s", frames_per_s(result)))
-      .add("computed", fmt::format("{} substeps", result.substeps))
+      .add("planned", fmt::format("{} substeps", result.planned_substeps))
       .add("own processor", fmt::format("{:.2f} of a core", result.cpu / result.wall));
   for (const auto& [reason, count] : result.errors)
     facts.add("errors", fmt::format("{} x {}", count, reason));
@@ -138,7 +138,7 @@ Json load_json(const LoadOrder& order, const LoadResult& result) {
             {"frames_per_s", frames_per_s(result)},
             {"frames_lost", result.frames_lost},
             {"frames_doubled", result.frames_doubled},
-            {"substeps", result.substeps},
+            {"planned_substeps", result.planned_substeps},
             {"wall_s", result.wall.count()},
             {"cpu_s", result.cpu.count()}};
   json.update(times_json(result));

@@ -483,7 +483,7 @@ class Load {
       std::int64_t computed = session.last_frame.value_or(0);
       for (const auto& subscriber : session.subscribers)
         computed = std::max(computed, subscriber->next_frame - 1);
-      result_.substeps += computed * session.substeps_per_frame;
+      result_.planned_substeps += computed * session.substeps_per_frame;
       for (const auto& subscriber : session.subscribers)
         result_.frames_lost += computed + 1 - subscriber->next_frame;
       for (std::int64_t frame = computed + 1; frame <= due; ++frame) {

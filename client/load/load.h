@@ -68,7 +68,7 @@ struct LoadResult {
   std::int64_t frames_received = 0;
   std::int64_t frames_lost = 0;                // computed, but never received
   std::int64_t frames_doubled = 0;             // received again, or out of order
-  std::int64_t substeps = 0;                   // that the sessions' frames took, as planned
+  std::int64_t planned_substeps = 0;           // of the sessions' frames; those at rest take none
   std::map<std::string, std::int64_t> errors;  // by call and reason, "step: SOLVER_FAILED"
   std::chrono::duration<double> wall{};        // until sessions were stopped
   std::chrono::duration<double> cpu{};         // of this process, in that time

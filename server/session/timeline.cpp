@@ -34,7 +34,7 @@ Timeline::Timeline(Simulation given, std::int64_t max_frame_work, Duration snaps
 
 FramePart Timeline::advance(Scheduler& scheduler) {
   constexpr std::chrono::microseconds kSlice{20'000}, kBusySlice = Scheduler::kTurn;
-  constexpr std::chrono::microseconds kYield{1000};  // what calls wait for, at most
+  constexpr std::chrono::microseconds kYield{1000};  // that calls wait for, or a substep
   const auto begin = Clock::now();
   const auto processor = thread_time();
   auto yielded = begin;

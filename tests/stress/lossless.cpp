@@ -66,11 +66,11 @@ Outcome lossless(Form form) {
   const std::int64_t wanted = frames * (hashed + written);
   return {.figure = fmt::format("{} sessions x {} frames, {} substeps hashed: {} of {} received, "
                                 "{} lost, {} doubled, {} differing, {} errors",
-                                hashed + written, frames, result.substeps, result.frames_received,
-                                wanted, result.frames_lost, result.frames_doubled, differing.load(),
-                                result.error_count()),
+                                hashed + written, frames, result.planned_substeps,
+                                result.frames_received, wanted, result.frames_lost,
+                                result.frames_doubled, differing.load(), result.error_count()),
           .hold = "all, 0, 0, 0, 0",
-          .counts = result.clean() && differing == 0 && result.substeps > 0 &&
+          .counts = result.clean() && differing == 0 && result.planned_substeps > 0 &&
                     result.frames_received == wanted};
 }
 
